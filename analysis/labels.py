@@ -24,7 +24,7 @@ MEASURES = {
 
 
 def unit_of(measure: str) -> tuple[str, float]:
-    """The unit in which differences of a measure are told, and the factor that leads to it."""
+    """The unit in which differences of a measure are stated, and the factor that leads to it."""
     return ("percentage points", 100.0) if measure == "correct" else ("points of 100", 1.0)
 
 

@@ -59,7 +59,7 @@ class TableMap:
 
 
 @dataclass(frozen=True, eq=False)
-class Imported:
+class ImportedAnswers:
     """Answers read from tables.
 
     Parameters
@@ -153,7 +153,7 @@ def _check_map(mapping: TableMap) -> None:
             )
 
 
-def load_imported(files: Sequence[str | Path], mapping: TableMap) -> Imported:
+def load_imported(files: Sequence[str | Path], mapping: TableMap) -> ImportedAnswers:
     """Read tables of one experiment.
 
     Parameters
@@ -189,7 +189,7 @@ def load_imported(files: Sequence[str | Path], mapping: TableMap) -> Imported:
         _check_classes(classes, ", ".join(sorted({Path(path).name for path in files})[:3]))
     measure = "value" if mapping.value else "correct"
     answers = rows.drop(columns=["file", "where"])
-    return Imported(answers, mapping.factors, measure, classes, missed)
+    return ImportedAnswers(answers, mapping.factors, measure, classes, missed)
 
 
 class _Labels:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from modeling.files.claims import FEW, Plan
+from modeling.files.claims import FEW, PlanSection
 from modeling.files.described import naming
 
 EQUIVALENCE, DIFFERENCE = "equivalence", "difference"
@@ -87,6 +87,6 @@ def plan_from(values: object, *, path: Path, sha256: tuple[str, ...] = ()) -> An
         For claims, a rule or a share that are not such as a study file can state.
     """
     with naming(path):
-        stated = Plan.read(values)
+        stated = PlanSection.read(values)
     claims = tuple(Claim(**vars(claim)) for claim in stated.claims)
     return AnalysisPlan(**{**vars(stated), "claims": claims, "sha256": sha256})

@@ -338,14 +338,14 @@ def power_sentences(table: pd.DataFrame, *, claims: Sequence[Claim]) -> list[str
         enough = own[(own["verdict"] == wanted) & (own["chance"] >= TARGET)]["n"]
         n = enough.min() if len(enough) else own["n"].max()
         at_n = table[(table["claim"] == claim.name) & (table["n"] == n)]
-        told = [_chances(at_n[at_n["texture"] == ALL_TEXTURES])]
+        parts = [_chances(at_n[at_n["texture"] == ALL_TEXTURES])]
         mean = at_n[at_n["texture"] == MEAN_ALONE]
         if wanted == EQUIVALENT and len(mean):
-            told.append(f"mean alone inside the bounds {_chance(mean.iloc[0])}")
+            parts.append(f"mean alone inside the bounds {_chance(mean.iloc[0])}")
         if not len(enough):
             why = _too_few_people(at_n) if wanted == EQUIVALENT and len(mean) else ""
-            told.append(f"{wanted} with {TARGET:.0%} is not reached{why}")
-        lines.append(f"{claim.name}: simulated: {n} participants: {'; '.join(told)}")
+            parts.append(f"{wanted} with {TARGET:.0%} is not reached{why}")
+        lines.append(f"{claim.name}: simulated: {n} participants: {'; '.join(parts)}")
     return lines
 
 

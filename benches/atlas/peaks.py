@@ -200,7 +200,7 @@ def frequency_error_percent(found: Found) -> float:
     return 100 * float(np.median(errors))
 
 
-def not_told_apart(found: Found) -> float:
+def not_separated(found: Found) -> float:
     """Share of pairs without a layer in reach of each of the two, half their distance to a side."""
     apart = []
     for truth, layers in found:
@@ -358,7 +358,7 @@ FIGURES: dict[Callable[[Found], float], tuple[str, str, float, float]] = {
         FREQUENCY_PERCENT,
         FREQUENCY_PERCENT_AT_MOST,
     ),
-    not_told_apart: ("pairs not told apart", "", MERGED, MERGED_AT_MOST),
+    not_separated: ("pairs not told apart", "", MERGED, MERGED_AT_MOST),
 }
 WIDTH_COLUMNS = {"15 Hz wide": 15.0, "60 Hz wide": 60.0}
 SPEED_COLUMNS = {"two speeds": 2.0, "one speed": ONE_SPEED}
@@ -383,7 +383,7 @@ CASES: tuple[Case, ...] = (
         JOINT,
         SPACING,
         crowded,
-        scored_by=not_told_apart,
+        scored_by=not_separated,
         across="width of the layers",
         columns=WIDTH_COLUMNS,
         theory=spacing_of_no_evidence,
@@ -394,7 +394,7 @@ CASES: tuple[Case, ...] = (
         EITHER,
         SPACING,
         crowded,
-        scored_by=not_told_apart,
+        scored_by=not_separated,
         across="width of the layers",
         columns=WIDTH_COLUMNS,
         theory=spacing_of_merging,

@@ -47,10 +47,10 @@ def _error_db(rendered: Floats, hand: Hand) -> float:
     return float(max(error_db, LEAST_DIFFERENCE_DB))
 
 
-def rendered_from(times_s: Floats, hand: Hand, *, told: bool = True) -> Floats:
+def rendered_from(times_s: Floats, hand: Hand, *, timed: bool = True) -> Floats:
     """Canvas by readings of a hand at rising times (s), each taken in at the next sample.
 
-    Where they are not `told`, readings count as made at that sample.
+    Where they are not `timed`, readings count as made at that sample.
     """
     renderer = Renderer(planted_texture("canvas"))
     count = hand.speed_mm_s.size
@@ -62,24 +62,24 @@ def rendered_from(times_s: Floats, hand: Hand, *, told: bool = True) -> Floats:
         now = int(np.ceil(time))
         parts.append(renderer.render_on(now - done))
         done = now
-        renderer.read(speed, force, ago=now - time if told else 0.0)
+        renderer.read(speed, force, ago=now - time if timed else 0.0)
     return np.concatenate([*parts, renderer.render_on(count - done)])
 
 
-def off_the_beat(value: float, column: float, *, told: bool, full: bool) -> float:
+def off_the_beat(value: float, column: float, *, timed: bool, full: bool) -> float:
     """Error (dB) for readings every … ms, `column` ms later than updates."""
     hand = stroke(RATE_HZ, duration_s=STROKE_S[full])
     times = np.arange(0, STROKE_S[full], 1e-3 * value) + 1e-3 * column
-    return _error_db(rendered_from(times, hand, told=told), hand)
+    return _error_db(rendered_from(times, hand, timed=timed), hand)
 
 
-def jittered(value: float, column: float, *, told: bool, full: bool) -> float:
+def jittered(value: float, column: float, *, timed: bool, full: bool) -> float:
     """Error (dB) for readings every millisecond, each late by up to … ms at random."""
     del column
     hand = stroke(RATE_HZ, duration_s=STROKE_S[full])
     beat = np.arange(0, STROKE_S[full], UPDATE_S)
     times = np.sort(beat + generator([0x4A]).uniform(0, 1e-3 * value, beat.size))
-    return _error_db(rendered_from(times, hand, told=told), hand)
+    return _error_db(rendered_from(times, hand, timed=timed), hand)
 
 
 def missing(value: float, column: float, *, full: bool) -> float:
@@ -169,7 +169,7 @@ CASES: tuple[Case, ...] = (
                 severe=20.0,
                 default=2.0,
             ),
-            measure=partial(off_the_beat, told=method == WITH_TIMES),
+            measure=partial(off_the_beat, timed=method == WITH_TIMES),
             across="late by",
             columns={"on updates": 0.0, "0.2 ms": 0.2, "0.5 ms": 0.5},
         )
@@ -180,7 +180,7 @@ CASES: tuple[Case, ...] = (
             method=method,
             ours=method == WITH_TIMES,
             axis=Axis(name="jitter of readings", unit="ms", mild=0.1, severe=20.0, default=1.0),
-            measure=partial(jittered, told=method == WITH_TIMES),
+            measure=partial(jittered, timed=method == WITH_TIMES),
         )
         for method in (WITH_TIMES, AS_OF_NOW)
     ),

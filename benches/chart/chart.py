@@ -12,7 +12,7 @@ import pandas as pd
 
 from benches.chart.judging import SINGLE, Judged
 from benches.chart.summary import (
-    Comparison,
+    RivalComparison,
     comparisons,
     front_table,
     summarised,
@@ -35,7 +35,7 @@ class Chart:
         Medians and spread over textures, from `summary.summarised`, with ns per rendered sample.
     fronts : DataFrame
         From `summary.front_table`.
-    comparisons : tuple of Comparison
+    comparisons : tuple of RivalComparison
         Our default against every rival.
     warnings : tuple of str
     machine : str
@@ -44,7 +44,7 @@ class Chart:
     rows: pd.DataFrame
     summary: pd.DataFrame
     fronts: pd.DataFrame
-    comparisons: tuple[Comparison, ...]
+    comparisons: tuple[RivalComparison, ...]
     warnings: tuple[str, ...]
     machine: str
 

@@ -19,7 +19,7 @@ function front(points) {
   return points.filter((p) => !points.some((q) => beats(q, p))).sort((a, b) => a.x - b.x);
 }
 
-function told(row, x, y) {
+function hoverText(row, x, y) {
   const blending = row.blending ? `, ${row.blending}` : "";
   const numbers = chart.costs.concat(chart.measures).map(([name, label]) => {
     const value = row[name];
@@ -36,7 +36,7 @@ function draw() {
     return {
       name: family, mode: "markers", type: "scatter",
       x: mine.map((row) => row[x]), y: mine.map((row) => error(row, y)),
-      text: mine.map((row) => told(row, x, y)), hovertemplate: "%{text}<extra></extra>",
+      text: mine.map((row) => hoverText(row, x, y)), hovertemplate: "%{text}<extra></extra>",
       marker: { color: colour, symbol, size: mine.map((row) => row.usual ? 12 : 7),
         opacity: mine.map((row) => row.usual ? 1 : 0.55), line: { color: "white", width: 0.5 } },
     };

@@ -15,13 +15,13 @@ from benches.chart.fitted import Fitted, Layered, update_samples
 from benches.chart.measures import (
     Accuracy,
     RecordYardstick,
-    Yardstick,
+    ReferenceMagnitude,
     frequencies_hz,
     over_conditions,
 )
 from benches.chart.methods import TRUTH, Fit, Subject, fit_method
 from benches.chart.rival_fits import ByBlock, Filtered
-from benches.chart.surfaces import Material, Source, judged_stroke, load_material
+from benches.chart.surfaces import Material, Origin, judged_stroke, load_material
 from modeling import ARModel, InputError
 from modeling.fitting.conditions import spectra_by_condition
 from modeling.models.grid import Condition
@@ -51,13 +51,13 @@ class Judged:
         What could not be used, or fitted.
     """
 
-    source: Source
+    source: Origin
     rows: pd.DataFrame
     fitted: dict[tuple[str, str], Fitted]
     warnings: tuple[str, ...]
 
 
-def judge(source: Source, *, methods: Sequence[str]) -> Judged:
+def judge(source: Origin, *, methods: Sequence[str]) -> Judged:
     """Fit every method to one texture and judge it, on one core.
 
     Raises
@@ -89,7 +89,7 @@ def judge(source: Source, *, methods: Sequence[str]) -> Judged:
     return Judged(source, pd.DataFrame(rows), fitted, tuple(warnings))
 
 
-def _loaded(source: Source) -> list[Fit]:
+def _loaded(source: Origin) -> list[Fit]:
     """The models that were given, with no time of fitting."""
     fits = []
     for name, path in source.models:
@@ -108,11 +108,11 @@ def record_yardsticks(measured: Measured) -> dict[Condition, RecordYardstick]:
 class _Judging:
     """One texture's yardsticks, computed once for all methods."""
 
-    def __init__(self, source: Source, material: Material) -> None:
+    def __init__(self, source: Origin, material: Material) -> None:
         self._source, self._material = source, material
         self._frequency = frequencies_hz(material.rate_hz)
         self._stroke = judged_stroke(material.rate_hz)
-        self._yardsticks: dict[Condition, Yardstick] = {}
+        self._yardsticks: dict[Condition, ReferenceMagnitude] = {}
         # Often nothing is dropped, and a simplified model is the full one.
         self._known: dict[tuple[str, bool], list[dict[str, Any]]] = {}
 
@@ -215,13 +215,13 @@ class _Judging:
             ]
         return {f"{STROKING}_{name}": value for name, value in over_conditions(found).items()}
 
-    def _yardstick(self, condition: Condition) -> Yardstick:
+    def _yardstick(self, condition: Condition) -> ReferenceMagnitude:
         if condition not in self._yardsticks:
             truth = self._material.truth
             assert truth is not None, "asked for only where it is known"
             speed, force = condition
             true = truth.magnitude(self._frequency, speed_mm_s=speed, force_n=force)
-            self._yardsticks[condition] = Yardstick(true, self._frequency)
+            self._yardsticks[condition] = ReferenceMagnitude(true, self._frequency)
         return self._yardsticks[condition]
 
     @cached_property
@@ -233,7 +233,7 @@ class _Judging:
         return record_yardsticks(self._material.hidden)
 
     @cached_property
-    def _along_stroke(self) -> list[Yardstick]:
+    def _along_stroke(self) -> list[ReferenceMagnitude]:
         speed, force = self._stroke.hand
         conditions = [(abs(float(speed[n])), float(force[n])) for n in self._stroke.places]
         return [self._yardstick(condition) for condition in conditions]

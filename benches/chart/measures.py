@@ -47,7 +47,7 @@ def frequencies_hz(rate_hz: float) -> Floats:
     return np.linspace(0.0, rate_hz / 2, points + 1)
 
 
-class Yardstick:
+class ReferenceMagnitude:
     """A known magnitude, (n,) at `frequencies_hz` and > 0, by which responses are judged.
 
     10 Hz … 0.98 of the Nyquist frequency. A response more than 60 dB below the truth counts as 60

@@ -178,7 +178,7 @@ _HANDS = {BETWEEN: "At rest between the conditions", STROKING: "During strokes"}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Comparison:
+class RivalComparison:
     """Our default against one rival's, on one kind of surface.
 
     Parameters
@@ -223,14 +223,14 @@ class Comparison:
         found = []
         for place, hand in _HANDS.items():
             if place in self.dominates_by:
-                told = f"it dominates joint ({self.dominates_by[place].text()})"
+                stated = f"it dominates joint ({self.dominates_by[place].text()})"
             elif place in self.dominated_by:
-                told = f"it is dominated ({self.dominated_by[place].text()})"
+                stated = f"it is dominated ({self.dominated_by[place].text()})"
             elif np.isfinite(self.ratios[place].mean):
-                told = "neither dominates the other"
+                stated = "neither dominates the other"
             else:
                 continue
-            found.append(f"{hand} {told}")
+            found.append(f"{hand} {stated}")
         return ". ".join(found)
 
     @property
@@ -249,7 +249,7 @@ class Comparison:
         return f"{farther}; it needs {costs}. It is ahead in {self.ahead}. {self.verdict}."
 
 
-def comparisons(rows: pd.DataFrame) -> list[Comparison]:
+def comparisons(rows: pd.DataFrame) -> list[RivalComparison]:
     """Our default against every rival, surface by surface, for each kind of surface."""
     found = []
     # Recordings whose halves were held out in turn give two rows per surface, averaged as one case.
@@ -267,14 +267,14 @@ def comparisons(rows: pd.DataFrame) -> list[Comparison]:
 
 def _comparison(
     of_kind: pd.DataFrame, mine: pd.DataFrame, other: pd.DataFrame, *, kind: str, rival: str
-) -> Comparison:
+) -> RivalComparison:
     """Of one rival."""
     pair = _paired(other, mine)
     theirs = of_kind[of_kind["method"] == rival]
     dominated = _dominated(theirs, by=of_kind[of_kind["family"].isin(OUR_FAMILIES)])
     dominates = _dominated(of_kind[of_kind["method"] == OURS], by=theirs)
     between = f"{BETWEEN}_distance_db"
-    return Comparison(
+    return RivalComparison(
         kind=kind,
         rival=rival,
         ratios={name: _ratio(column, *pair) for name, column in _COMPARED.items()},
@@ -385,11 +385,11 @@ COMPARISON_COLUMNS: Columns = (
 )
 
 
-def comparison_table(found: Sequence[Comparison]) -> pd.DataFrame:
+def comparison_table(found: Sequence[RivalComparison]) -> pd.DataFrame:
     """The comparisons as a table: ratios with their intervals, verdict and sentence."""
     rows = []
     for one in found:
         values = [value for name in _COMPARED for value in one.ratios[name]]
-        told = (one.ahead, one.verdict, one.sentence)
-        rows.append((one.kind, one.rival, one.surfaces, *values, *told))
+        words = (one.ahead, one.verdict, one.sentence)
+        rows.append((one.kind, one.rival, one.surfaces, *values, *words))
     return pd.DataFrame(rows, columns=names(COMPARISON_COLUMNS))

@@ -62,7 +62,7 @@ PLACES = 24
 
 
 @dataclass(frozen=True)
-class Source:
+class Origin:
     """Where a texture comes from; small, so that it can be sent to another process.
 
     Parameters
@@ -136,7 +136,7 @@ class _ToolkitTruth:
         return self.texture.filter(speed_mm_s, force_n).response(frequency_hz)
 
 
-def load_material(source: Source) -> Material:
+def load_material(source: Origin) -> Material:
     """The texture of a source.
 
     Raises
@@ -149,7 +149,7 @@ def load_material(source: Source) -> Material:
     return _known(*_truth_and_records(source))
 
 
-def _truth_and_records(source: Source) -> tuple[Truth, RecordingSet]:
+def _truth_and_records(source: Origin) -> tuple[Truth, RecordingSet]:
     if source.kind == "drawn":
         surface = draw_surface(source.seed)
         return surface, surface.record(duration_s=RECORD_S, seed=source.seed)
@@ -176,7 +176,7 @@ def _known(truth: Truth, records: RecordingSet) -> Material:
     return Material(measured, truth, at, between, [], measured[0][1].rate_hz, prepare_s, True)
 
 
-def _recorded(source: Source) -> Material:
+def _recorded(source: Origin) -> Material:
     assert source.path is not None, "recordings are read from a folder"
     records, unusable = load_usable(source.path, texture=source.name)
     start = process_time()
@@ -235,16 +235,16 @@ FULL = Simulated(40, TEXTURES)
 FEW = Simulated(3, ())
 
 
-def simulated_sources(which: Simulated) -> list[Source]:
+def simulated_sources(which: Simulated) -> list[Origin]:
     """Drawn surfaces and planted textures, each with noise of its own."""
     numbers = range(FIRST_SURFACE, FIRST_SURFACE + which.drawn)
-    drawn = [Source("drawn", f"drawn {number}", number) for number in numbers]
-    return drawn + [Source("planted", name, seed) for seed, name in enumerate(which.planted)]
+    drawn = [Origin("drawn", f"drawn {number}", number) for number in numbers]
+    return drawn + [Origin("planted", name, seed) for seed, name in enumerate(which.planted)]
 
 
 def recorded_sources(
     folders: Sequence[Path], models: Sequence[Path], *, both_halves: bool
-) -> list[Source]:
+) -> list[Origin]:
     """The textures of some folders, each with the models that were given for it.
 
     Raises
@@ -261,7 +261,7 @@ def recorded_sources(
                 for folder, found in by_folder.items()
             )
             for fold in (1, 0) if both_halves else (1,):
-                sources.append(Source("recorded", name, path=path, fold=fold, models=given))
+                sources.append(Origin("recorded", name, path=path, fold=fold, models=given))
     return sources
 
 
@@ -278,8 +278,8 @@ def _model_of(texture: str, models: Mapping[str, Path], folder: Path) -> Path:
     return models[texture]
 
 
-def toolkit_sources(paths: Sequence[Path]) -> list[Source]:
+def toolkit_sources(paths: Sequence[Path]) -> list[Origin]:
     """Textures of toolkit files; refused as `load_hatt` refuses them."""
     return [
-        Source("toolkit", load_hatt(path).material, seed, path) for seed, path in enumerate(paths)
+        Origin("toolkit", load_hatt(path).material, seed, path) for seed, path in enumerate(paths)
     ]

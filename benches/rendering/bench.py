@@ -71,7 +71,7 @@ Name = TypeVar("Name")
 
 
 @dataclass(frozen=True)
-class Effort:
+class BenchEffort:
     """How long to measure: samples per turn, turns of everything, starts of Python."""
 
     samples: int = 20480
@@ -84,7 +84,7 @@ class Effort:
         return self.turns + 1
 
 
-QUICK = Effort(samples=2048, turns=2, starts=1)
+QUICK = BenchEffort(samples=2048, turns=2, starts=1)
 
 
 @dataclass(frozen=True)
@@ -268,7 +268,7 @@ class Turn(NamedTuple):
 
 
 def bench_rendering(
-    effort: Effort | None = None, *, progress: Callable[[str], None] = lambda part: None
+    effort: BenchEffort | None = None, *, progress: Callable[[str], None] = lambda part: None
 ) -> RenderingBench:
     """Time the kernel and its rivals, all in turn, so that disturbances affect all of them.
 
@@ -278,7 +278,7 @@ def bench_rendering(
 
     Parameters
     ----------
-    effort : Effort, optional
+    effort : BenchEffort, optional
         How long to measure; the default takes about half a minute.
     progress : callable
         Called with each of the effort's `parts` when it is done.
@@ -288,7 +288,7 @@ def bench_rendering(
     InputError
         Where the parts in C were not compiled at installation.
     """
-    effort = effort or Effort()
+    effort = effort or BenchEffort()
     work = _in_python() | _at_sound_card(effort) | _sweep(effort)
     for layers in LAYERS:
         for update in UPDATES:
@@ -311,7 +311,7 @@ def bench_rendering(
     )
 
 
-def _filters_in_c(layers: int, update: int, effort: Effort) -> dict[Setting, Turn]:
+def _filters_in_c(layers: int, update: int, effort: BenchEffort) -> dict[Setting, Turn]:
     texture = layered_texture(layers)
     models: dict[str, LayeredModel] = dict.fromkeys(COMPILED, texture)
     models[AR] = _predictor(layers)
@@ -330,7 +330,7 @@ def _predictor(layers: int) -> LayeredModel:
     return tabled_predictor(predictor_of(layered_texture(layers)))
 
 
-def _by_block(layers: int, block: int, effort: Effort) -> dict[Setting, Turn]:
+def _by_block(layers: int, block: int, effort: BenchEffort) -> dict[Setting, Turn]:
     texture = layered_texture(layers)
     hand = stroke(effort.samples, rate_hz=RATE_HZ)
     readings = [(float(v), float(f)) for v, f in zip(*(x[::block] for x in hand), strict=True)]
@@ -359,7 +359,7 @@ def _next_block(
     return stream.render(*next(readings), block)
 
 
-def _sweep(effort: Effort) -> dict[Setting, Turn]:
+def _sweep(effort: BenchEffort) -> dict[Setting, Turn]:
     """Numbers of layers beside those that are compared with other filters."""
     return {
         Setting(ONE_CALL, KERNEL, layers, SWEEP_UPDATE): _in_calls(
@@ -379,7 +379,7 @@ def _in_python() -> dict[Setting, Turn]:
     return {Setting(ONE_CALL, PYTHON, 3, SWEEP_UPDATE): turn}
 
 
-def _at_sound_card(effort: Effort) -> dict[Setting, Turn]:
+def _at_sound_card(effort: BenchEffort) -> dict[Setting, Turn]:
     texture, update = layered_texture(3), SOUND_CARD_UPDATE
     stream = CompiledStream(KERNEL, texture, update_samples=update, seed=0, rate_hz=SOUND_CARD_HZ)
     hand, out = stroke(effort.samples, rate_hz=RATE_HZ), np.empty(effort.samples)
@@ -408,7 +408,7 @@ def _kernel_stream(layers: int, update: int) -> CompiledStream:
     return CompiledStream(KERNEL, layered_texture(layers), update_samples=update, seed=0)
 
 
-def _in_calls(stream: CompiledStream, effort: Effort, *, block: int | None = None) -> Turn:
+def _in_calls(stream: CompiledStream, effort: BenchEffort, *, block: int | None = None) -> Turn:
     """All samples, in calls of so many; in one by default."""
     count = effort.samples
     hand = stroke(count, rate_hz=RATE_HZ)

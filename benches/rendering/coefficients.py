@@ -81,7 +81,7 @@ class PoleZeroFilter:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class BandFilter:
+class SecondOrderBands:
     """Bands side by side: y = g·w + Σ y_i with y_i = b·(w − w″) − a₁·y_i′ − a₂·y_i″.
 
     Parameters
@@ -118,7 +118,7 @@ class BandFilter:
         bands = a[2 * each].sum(axis=0)
         return System(a, b, bands, self.noise_gain + float(self.gains.sum()))
 
-    def times(self, factor: float) -> BandFilter:
+    def times(self, factor: float) -> SecondOrderBands:
         """Louder by a factor."""
         return replace(self, noise_gain=self.noise_gain * factor, gains=self.gains * factor)
 
@@ -212,7 +212,7 @@ class BandTable:
     speeds_mm_s, forces_n : (S,), (F,) ndarray
         Rising, above 0, two or more each.
     values : (S, F, 1 + 3m) ndarray
-        Noise gain, then a₁ of all bands, a₂ of all, and b of all (`BandFilter`).
+        Noise gain, then a₁ of all bands, a₂ of all, and b of all (`SecondOrderBands`).
     rate_hz : float
     """
 
@@ -236,11 +236,11 @@ class BandTable:
             signs=np.zeros(self.layers),
         )
 
-    def filter(self, speed_mm_s: float, force_n: float) -> BandFilter:
+    def filter(self, speed_mm_s: float, force_n: float) -> SecondOrderBands:
         """What is in use at one speed (mm/s) and force (N); edges as of a `TextureModel`."""
         at, level = _values_at(self, speed_mm_s, force_n)
         first, second, gains = at[1:].reshape(3, -1)
-        return BandFilter(
+        return SecondOrderBands(
             noise_gain=float(at[0]) * level,
             first=first,
             second=second,

@@ -100,20 +100,20 @@ def predictor_of(texture: TextureModel) -> ARModel:
     )
 
 
-class Operations(NamedTuple):
+class ProductsAndSums(NamedTuple):
     """What a form needs for each sample, beside the noise: its products and its sums."""
 
     products: int
     sums: int
 
 
-def operations(name: str, layers: int) -> Operations:
+def operations(name: str, layers: int) -> ProductsAndSums:
     """Of one of `COMPILED` with so many layers and the noise branch (`kernel.h`, `rivals.h`)."""
     if name == AR:
-        return Operations(ORDER + 1, ORDER)
+        return ProductsAndSums(ORDER + 1, ORDER)
     products, sums = {KERNEL: (7, 9), DIRECT: (3, 3), TRANSPOSED: (3, 4), TPT: (5, 6)}[name]
     of_branch = {KERNEL: (1, 1), DIRECT: (1, 1)}.get(name, (1, 0))  # a gain's ramp; x - x''
-    return Operations(products * layers + of_branch[0], sums * layers + of_branch[1])
+    return ProductsAndSums(products * layers + of_branch[0], sums * layers + of_branch[1])
 
 
 class CompiledStream:

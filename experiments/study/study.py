@@ -22,7 +22,7 @@ from modeling import InputError
 from modeling.checks import check_keys
 from modeling.errors import shown
 from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.claims import Claim, Plan
+from modeling.files.claims import ClaimSection, PlanSection
 from modeling.files.described import DescribedFile, Section, key
 from modeling.files.hashes import sha256_of_values
 from modeling.files.kinds import Label, ListedLabel, is_different, is_label, is_line
@@ -128,8 +128,8 @@ class Study(DescribedFile):
     ] = ("en",)
     consent: Annotated[Consent, key("the page of consent")] = Consent()
     questions: Annotated[tuple[Question, ...], key("what each participant is asked once")] = ()
-    plan: Annotated[Plan, key("what is fixed before the first answer")] = field(
-        default_factory=Plan
+    plan: Annotated[PlanSection, key("what is fixed before the first answer")] = field(
+        default_factory=PlanSection
     )
     longest_gap_min: Annotated[
         float,
@@ -195,7 +195,7 @@ class Study(DescribedFile):
             check_plan(task, in_order[task], textures=self.textures)
         object.__setattr__(self, "tasks", in_order)
 
-    def _check_claim(self, claim: Claim) -> None:
+    def _check_claim(self, claim: ClaimSection) -> None:
         """Refuse a claim about a task or models that are not planned, or about too few people."""
         if claim.task not in self.tasks:
             raise InputError(

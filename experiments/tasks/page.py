@@ -16,7 +16,7 @@ from experiments.tasks.durations import (
 )
 from modeling.errors import counted
 from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.claims import RATINGS, Claim, Plan
+from modeling.files.claims import RATINGS, ClaimSection, PlanSection
 
 TESTED = {
     "equivalence": "two one-sided t-tests of the differences within persons (TOST)",
@@ -156,7 +156,7 @@ def _claims(study: Study) -> Iterator[str]:
         )
 
 
-def _rule(plan: Plan) -> str:
+def _rule(plan: PlanSection) -> str:
     """What decides the verdicts."""
     if plan.rule == "tests":
         return "Rule of verdicts: the tests that each claim names."
@@ -168,7 +168,7 @@ def _rule(plan: Plan) -> str:
     )
 
 
-def proof_of_sensitivity(study: Study, claim: Claim) -> str:
+def proof_of_sensitivity(study: Study, claim: ClaimSection) -> str:
     """What has to show that people tell surfaces apart, before a claim may end in equality."""
     plan = study.plan_of(claim.task)
     if claim.task == "relative":
@@ -184,7 +184,7 @@ def proof_of_sensitivity(study: Study, claim: Claim) -> str:
     )
 
 
-def _claimed(claim: Claim) -> str:
+def _claimed(claim: ClaimSection) -> str:
     first, second = claim.models
     measure = claim.measure.replace("_", " ")
     unit = "points on the scale" if claim.measure in RATINGS else "(proportions of correct answers)"
@@ -202,7 +202,7 @@ def _claimed(claim: Claim) -> str:
     )
 
 
-def _tested(plan: Plan, claim: Claim) -> str:
+def _tested(plan: PlanSection, claim: ClaimSection) -> str:
     if plan.rule == "model":
         return f"Claimed: {claim.test}."
     return f"Test of {claim.test}: {TESTED[claim.test]}, corrected after Holm over the textures."

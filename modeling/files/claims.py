@@ -24,7 +24,7 @@ LARGEST = {**dict.fromkeys(RATINGS, ENDS[1] - ENDS[0]), "correct": 1.0}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Claim(Section):
+class ClaimSection(Section):
     """One claim about two sets of models, with the bounds that would contradict it."""
 
     WHERE: ClassVar[str] = "[[plan.claims]]"
@@ -77,7 +77,7 @@ class Claim(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan(Section):
+class PlanSection(Section):
     """Claims and exclusions, fixed before the first answer."""
 
     WHERE: ClassVar[str] = "[plan]"
@@ -106,7 +106,7 @@ class Plan(Section):
             le=LARGEST_FEW,
         ),
     ] = FEW
-    claims: Annotated[tuple[Claim, ...], key("what is claimed")] = ()
+    claims: Annotated[tuple[ClaimSection, ...], key("what is claimed")] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -17,7 +17,7 @@ from tactileq.workers import working
 
 if TYPE_CHECKING:
     from benches.chart.chart import Chart
-    from benches.chart.surfaces import Source
+    from benches.chart.surfaces import Origin
     from benches.rendering.bench import RenderingBench
     from modeling.files.folders import Contents
 
@@ -114,7 +114,7 @@ def bench_chart(
 
 def chart_sources(
     recordings: Sequence[Path], toolkit: Sequence[Path], models: Sequence[Path], *, full: bool
-) -> list[Source]:
+) -> list[Origin]:
     """Which textures are charted.
 
     Raises
@@ -139,7 +139,7 @@ def chart_sources(
 
 
 def charted(
-    sources: Sequence[Source],
+    sources: Sequence[Origin],
     methods: Sequence[str],
     *,
     jobs: int | None = None,
@@ -174,14 +174,14 @@ def bench_rendering_into(out: Path, *, quick: bool, plot: bool) -> None:
     """Time the renderer and its rivals; print and write the results."""
     from analysis.columns import tsv_text
     from analysis.page.saving import DOTS_PER_INCH
-    from benches.rendering.bench import QUICK, Effort, bench_rendering
+    from benches.rendering.bench import QUICK, BenchEffort, bench_rendering
     from benches.rendering.figure import figure_rendering
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
     from modeling.files.writing import write_text
 
     seen = check_own_results(out, "bench render")
-    effort = QUICK if quick else Effort()
+    effort = QUICK if quick else BenchEffort()
     with progress("Timing", effort.parts) as advance:
         timed = bench_rendering(effort, progress=advance)
     with replace_folder(out, seen) as fresh:

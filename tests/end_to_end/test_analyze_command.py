@@ -17,7 +17,7 @@ from experiments.study.models import ModelSets
 from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from modeling import Threshold, simplify
-from modeling.files.claims import Claim, Plan
+from modeling.files.claims import ClaimSection, PlanSection
 from modeling.files.hashes import sha256_of_paths
 from rig.twin import SimulatedRig
 from stimuli.planted.textures import planted_texture
@@ -68,7 +68,7 @@ def simulated_in(folder: Path) -> Path:
         name: simplify(truth, threshold, criterion="paper-fft").model
         for name, truth in truths.items()
     }
-    claim = Claim(
+    claim = ClaimSection(
         name="as strong",
         task="absolute",
         measure="magnitude_similarity",
@@ -85,7 +85,7 @@ def simulated_in(folder: Path) -> Path:
             "absolute": TaskPlan(participants=4, schedule="interleaved", training_trials=1),
             "relative": TaskPlan(participants=2, schedule="by-day", repeats=1, training_trials=1),
         },
-        plan=Plan(claims=(claim,), exclusions=("Whoever presses nothing.",)),
+        plan=PlanSection(claims=(claim,), exclusions=("Whoever presses nothing.",)),
     )
     simulate_study(
         study,

@@ -30,7 +30,7 @@ from experiments.study.models import ModelSets
 from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from modeling import InputError, Threshold, simplify
-from modeling.files.claims import Claim, Plan
+from modeling.files.claims import ClaimSection, PlanSection
 from rig.twin import SimulatedRig
 from stimuli.planted.textures import planted_texture
 from tactileq.commands.power import (
@@ -47,7 +47,7 @@ from tactileq.workers import working
 from tests.refusals import refused
 
 TEXTURES = ("canvas", "PVC")
-RATED = Claim(
+RATED = ClaimSection(
     name="rated the same",
     task="absolute",
     measure="magnitude_similarity",
@@ -72,7 +72,7 @@ def study() -> Study:
             ),
             "oddity": TaskPlan(participants=4, schedule="interleaved", repeats=6),
         },
-        plan=Plan(claims=(RATED, ODD)),
+        plan=PlanSection(claims=(RATED, ODD)),
     )
 
 
@@ -92,10 +92,10 @@ def people(study: Study, models: ModelSets, *, most: int, points: float = 0.0) -
     return people_of(planned_for(study, [most]), models, threshold="codec", planted=planted)
 
 
-def by_model(study: Study, *claims: Claim) -> Study:
+def by_model(study: Study, *claims: ClaimSection) -> Study:
     """The study with enough people for the model of the participants, which decides."""
     eight = {task: replace(plan, participants=8) for task, plan in study.tasks.items()}
-    return replace(study, tasks=eight, plan=Plan(claims=claims, rule="model"))
+    return replace(study, tasks=eight, plan=PlanSection(claims=claims, rule="model"))
 
 
 def chance(table: pd.DataFrame, claim: str, texture: str, *, n: int, verdict: str) -> float:
@@ -232,7 +232,7 @@ def test_a_planted_difference_is_found_and_none_is_called_equivalent(
 
 def test_without_anchors_equalities_are_counted_as_withheld(study: Study, models: ModelSets):
     bare = replace(study.plan_of("absolute"), anchors={})
-    plain = replace(study, plan=Plan(claims=(RATED,)), tasks={"absolute": bare})
+    plain = replace(study, plan=PlanSection(claims=(RATED,)), tasks={"absolute": bare})
     table = chances(people(plain, models, most=12), (12,), simulations=6, seed=1, jobs=1)
     known = {"texture": ALL_TEXTURES, "n": 12, "claim": RATED.name}
     assert chance(table, **known, verdict=WITHHELD) > 0.6
@@ -244,7 +244,7 @@ def test_with_catch_trials_an_equality_of_the_odd_one_can_be_concluded(
 ):
     caught = replace(study.plan_of("oddity"), catch={"canvas": "PVC"}, catch_trials=6)
     tasks = {"absolute": study.plan_of("absolute"), "oddity": caught}
-    with_catch = replace(study, plan=Plan(claims=(ODD,)), tasks=tasks)
+    with_catch = replace(study, plan=PlanSection(claims=(ODD,)), tasks=tasks)
     planted = [f"{scale}=0" for scale in ("magnitude_similarity", "frequency_similarity")]
     who = people_of(
         planned_for(with_catch, [12]),
@@ -323,16 +323,18 @@ def test_other_effects_are_refused(text: str):
 
 def test_what_cannot_be_planned_is_refused(study: Study, models: ModelSets):
     with refused(ValueError, expected=["claims", "[[plan.claims]]"], got="none"):
-        planned_for(replace(study, plan=Plan()), [4])
+        planned_for(replace(study, plan=PlanSection()), [4])
     by_day = {**study.tasks, "absolute": TaskPlan(participants=4, schedule="by-day")}
     with refused(InputError, expected=["even", "by-day", "[absolute]"], got=7):
         planned_for(replace(study, tasks=by_day), [4, 7])
-    rule = replace(study, plan=Plan(claims=(RATED,), rule="model"), tasks=by_model(study).tasks)
+    rule = replace(
+        study, plan=PlanSection(claims=(RATED,), rule="model"), tasks=by_model(study).tasks
+    )
     with refused(ValueError, expected=[8, "participants", "model"], got=[6, "--subjects"]):
         planned_for(rule, [6, 12])
     with refused(InputError, expected=["magnitude_similarity", "canvas"], got=200.0):
         people(study, models, most=4, points=200.0)
     trays = {"silk": "A", "PVC": "B"}
-    silk = replace(study, textures=tuple(trays), trays=trays, tasks={}, plan=Plan())
+    silk = replace(study, textures=tuple(trays), trays=trays, tasks={}, plan=PlanSection())
     with refused(ValueError, expected=["planted", "aluminum", "wall paper"], got="silk"):
         people_of(silk, models, threshold="codec", planted={})

@@ -48,7 +48,7 @@ _GEE = (
 )
 
 
-class Said(NamedTuple):
+class EffectInWords(NamedTuple):
     """The result of a model of single answers: direction of a significant effect, p, wording."""
 
     sign: int
@@ -111,22 +111,22 @@ def mixed_section(
     return Section("mixed", "Models of single answers", tuple(tables), outcomes=tuple(outcomes))
 
 
-def _mixed_said(row: Mapping[Hashable, Any]) -> Said:
+def _mixed_said(row: Mapping[Hashable, Any]) -> EffectInWords:
     effect = _with_interval([f"{row[name]:+.1f}" for name in ("estimate", "ci_low", "ci_high")])
     text = f"{row['method']} {effect} points, p = {p_value(row['p'])}"
-    return Said(_sign(row["estimate"], row["p"]), row["p"], text)
+    return EffectInWords(_sign(row["estimate"], row["p"]), row["p"], text)
 
 
-def _gee_said(row: Mapping[Hashable, Any]) -> Said:
+def _gee_said(row: Mapping[Hashable, Any]) -> EffectInWords:
     sign = _sign(row["share_other"] - row["share_reference"], row["p"])
     text = f"{row['method']} p = {p_value(row['p'])}"
     if row["method"] == GEE:
         ratios = [f"{row[name]:.2f}" for name in ("odds_ratio", "ci_low", "ci_high")]
         text = f"{row['method']} odds ratio {_with_interval(ratios)}, p = {p_value(row['p'])}"
-    return Said(sign, row["p"], text)
+    return EffectInWords(sign, row["p"], text)
 
 
-def _beside_the_paired_test(one: ClaimFound, said: Sequence[Said]) -> str:
+def _beside_the_paired_test(one: ClaimFound, said: Sequence[EffectInWords]) -> str:
     """Whether models of single answers agree with the paired test over all textures."""
     paired = one.tests.to_dict("records")[0]
     sign = _sign(paired["mean_difference"], paired["p"])

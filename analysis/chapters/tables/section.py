@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.answers.imported import Imported
+from analysis.answers.imported import ImportedAnswers
 from analysis.chapters.tables.factorial import (
     ANOVA_COLUMNS,
     CELL_COLUMNS,
@@ -38,12 +38,12 @@ WORDS = {"correct": "accuracy", "value": "mean"}
 LABELS = {"correct": "accuracy (share of right answers, 0–1)", "value": "mean (unit of the table)"}
 
 
-def table_sections(imported: Imported, *, rng: np.random.Generator) -> list[Section]:
+def table_sections(imported: ImportedAnswers, *, rng: np.random.Generator) -> list[Section]:
     """Accuracy or mean by condition, analysis of variance, confusion matrices.
 
     Parameters
     ----------
-    imported : Imported
+    imported : ImportedAnswers
     rng : Generator
         Draws the sign flips of the paired tests.
     """
@@ -59,7 +59,7 @@ def table_sections(imported: Imported, *, rng: np.random.Generator) -> list[Sect
     return sections
 
 
-def answer_of_table(imported: Imported) -> str:
+def answer_of_table(imported: ImportedAnswers) -> str:
     """The sentence on top of the report: the mean over participants with its interval."""
     cells = participant_cells(imported.answers, imported.measure, factors=list(imported.factors))
     mean, low, high = overall_mean(cells)
@@ -71,7 +71,7 @@ def answer_of_table(imported: Imported) -> str:
     return f"{what} {_figure(mean)} over {who}{interval}{chance}."
 
 
-def _has_chance(imported: Imported) -> bool:
+def _has_chance(imported: ImportedAnswers) -> bool:
     return bool(imported.classes) and imported.measure == "correct"
 
 
@@ -79,7 +79,7 @@ def _figure(value: float) -> str:
     return f"{value:.3f}".replace("-", "−")
 
 
-def _condition_section(imported: Imported, cells: pd.DataFrame) -> Section:
+def _condition_section(imported: ImportedAnswers, cells: pd.DataFrame) -> Section:
     word, factors = WORDS[imported.measure], list(imported.factors)
     means = cell_means(cells, factors)
     how = "Wilson" if imported.measure == "correct" else "Student's t over trials"
@@ -117,7 +117,9 @@ def _condition_section(imported: Imported, cells: pd.DataFrame) -> Section:
     )
 
 
-def _pictures(imported: Imported, cells: pd.DataFrame, means: pd.DataFrame) -> tuple[Picture, ...]:
+def _pictures(
+    imported: ImportedAnswers, cells: pd.DataFrame, means: pd.DataFrame
+) -> tuple[Picture, ...]:
     if not imported.factors:
         return ()
     figure = figure_factorial(
@@ -176,7 +178,7 @@ def _effect(row: Mapping[Hashable, Any], measure: str) -> Outcome:
     )
 
 
-def _confusion_section(imported: Imported) -> Section:
+def _confusion_section(imported: ImportedAnswers) -> Section:
     matrices = imported_matrices(imported)
     pictures = tuple(
         Picture(
@@ -204,7 +206,7 @@ def _confusion_section(imported: Imported) -> Section:
     return Section("confusions", "Confusions", (*pictures, fold))
 
 
-def imported_matrices(imported: Imported) -> list[ConfusionMatrix]:
+def imported_matrices(imported: ImportedAnswers) -> list[ConfusionMatrix]:
     """Answers counted over participants, a matrix per condition, all over the same classes."""
     answers, classes = imported.answers, list(imported.classes)
     parts: list[tuple[str, pd.DataFrame]] = [("all conditions", answers)]

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from analysis.answers.imported import Imported, load_imported, parse_map
+from analysis.answers.imported import ImportedAnswers, load_imported, parse_map
 from modeling import InputError
 from tests.refusals import refused
 
 
-def load(folder: Path, text: str | bytes, mapping: str, name: str = "P01.csv") -> Imported:
+def load(folder: Path, text: str | bytes, mapping: str, name: str = "P01.csv") -> ImportedAnswers:
     data = text.encode() if isinstance(text, str) else text
     (folder / name).write_bytes(data)
     return load_imported([folder / name], parse_map(mapping))

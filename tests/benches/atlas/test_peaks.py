@@ -168,5 +168,5 @@ def test_figures_count_what_was_missed_and_what_was_invented() -> None:
     pairs = peaks.crowded(generator(1), 3.0, 20.0)[0]
     middles = pairs.layers.frequencies_hz.reshape(2, 2).mean(axis=1)
     half = np.append(pairs.layers.frequencies_hz[:2], middles[1])
-    assert peaks.not_told_apart([(pairs, found_as(pairs))]) == 0
-    assert peaks.not_told_apart([(pairs, found_as(pairs, frequencies_hz=half))]) == 0.5
+    assert peaks.not_separated([(pairs, found_as(pairs))]) == 0
+    assert peaks.not_separated([(pairs, found_as(pairs, frequencies_hz=half))]) == 0.5

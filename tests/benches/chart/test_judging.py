@@ -18,8 +18,8 @@ from benches.chart.methods import (
     fit_method,
 )
 from benches.chart.surfaces import (
+    Origin,
     Simulated,
-    Source,
     judged_stroke,
     load_material,
     recorded_sources,
@@ -199,7 +199,7 @@ def test_toolkit_models_are_a_truth(tmp_path: Path, hatt_xml) -> None:
     path = tmp_path / "Models_A.xml"
     path.write_text(hatt_xml(), encoding="utf-8")
     [source] = toolkit_sources([path])
-    assert source == Source("toolkit", "Planted 1", 0, path)
+    assert source == Origin("toolkit", "Planted 1", 0, path)
     rows = judge(source, methods=("AR(6)", "white noise", "truth")).rows
     by_method = rows.groupby("method")["between_distance_db"].median()
     assert by_method["truth"] == 0

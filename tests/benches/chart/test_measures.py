@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benches.chart.measures import Accuracy, Yardstick, frequencies_hz, over_conditions
+from benches.chart.measures import Accuracy, ReferenceMagnitude, frequencies_hz, over_conditions
 from modeling import PEQ
 
 TRUTH = PEQ(
     noise_gain=0.02, frequencies_hz=[80.0], bandwidths_hz=[30.0], gains=[0.4], rate_hz=1000.0
 )
 FREQUENCY = frequencies_hz(1000.0)
-YARDSTICK = Yardstick(TRUTH.response(FREQUENCY), FREQUENCY)
+YARDSTICK = ReferenceMagnitude(TRUTH.response(FREQUENCY), FREQUENCY)
 
 
 @given(st.floats(0.01, 100.0))

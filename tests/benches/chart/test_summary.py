@@ -162,7 +162,7 @@ def test_a_rival_that_cannot_keep_up_with_our_slower_updates_does_not_dominate()
     assert one.dominates_by == {}
 
 
-def test_nobody_dominates_where_accuracy_is_not_told_apart() -> None:
+def test_nobody_dominates_where_accuracy_is_not_separated() -> None:
     rows = rows_of(
         {("joint", 1.0): (100.0, [1.0, 2.0, 0.5]), ("paper", 1.0): (200.0, [1.1, 1.8, 0.6])}
     )

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benches.rendering.coefficients import BandFilter, PoleZeroFilter
+from benches.rendering.coefficients import PoleZeroFilter, SecondOrderBands
 from benches.rendering.levels import (
     System,
     level_at_rest,
@@ -70,9 +70,9 @@ def held(samples: int) -> Parameters:
     return Parameters(np.full(samples, PEQ_OF_TWO.noise_gain), *every)
 
 
-def bands() -> BandFilter:
+def bands() -> SecondOrderBands:
     k = np.tan(np.pi * PEQ_OF_TWO.bandwidths_hz / RATE_HZ)
-    return BandFilter(
+    return SecondOrderBands(
         noise_gain=PEQ_OF_TWO.noise_gain,
         first=-2 * np.cos(2 * np.pi * PEQ_OF_TWO.frequencies_hz / RATE_HZ) / (1 + k),
         second=(1 - k) / (1 + k),

@@ -24,7 +24,7 @@ from benches.rendering.bench import (
     SWEEP,
     SWEEP_UPDATE,
     UPDATES,
-    Effort,
+    BenchEffort,
     RenderingBench,
     Turn,
     _turn_ns,
@@ -52,7 +52,7 @@ from benches.rendering.rivals import (
 from modeling.rendering.plan import RenderPlan
 
 PARTS_TOLD: list[str] = []
-EFFORT = Effort(samples=1024, turns=2, starts=1)
+EFFORT = BenchEffort(samples=1024, turns=2, starts=1)
 
 
 @pytest.fixture(scope="module")

@@ -28,7 +28,7 @@ from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session
 from modeling import InputError
-from modeling.files.claims import Plan
+from modeling.files.claims import PlanSection
 from modeling.files.hashes import sha256_of_values
 from tests.refusals import refused
 
@@ -233,7 +233,7 @@ def test_as_many_begin_with_each_of_several_models(
 def test_an_odd_number_of_participants_is_one_apart(participants: int) -> None:
     plan = TaskPlan(participants=participants, schedule="interleaved")
     for seed in range(20):
-        study = shipped(seed=seed, tasks={"absolute": plan}, plan=Plan())
+        study = shipped(seed=seed, tasks={"absolute": plan}, plan=PlanSection())
         sessions = [main_of(study, "absolute", slot) for slot in range(1, participants + 1)]
         for texture in study.textures:
             full = sum(firsts(trials)[texture] == "full" for trials in sessions)

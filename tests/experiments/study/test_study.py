@@ -13,7 +13,7 @@ from experiments.study.study import SHIPPED_STUDY, Consent, Study, plan_sha256
 from experiments.study.task_plan import TaskPlan
 from modeling import InputError
 from modeling.files.answer_tables import ANSWER_TABLES, RESPONSE_TIME, answer_table
-from modeling.files.claims import Claim, Plan
+from modeling.files.claims import ClaimSection, PlanSection
 from modeling.files.described import Section, key
 from modeling.files.describing import key_tables, schema
 from tests.refusals import refused
@@ -32,7 +32,7 @@ SWAPPED = {"ja": ("はい", "いいえ")}
 
 def rich() -> Study:
     """A study that uses every table."""
-    claim = Claim(
+    claim = ClaimSection(
         name="odd",
         task="oddity",
         measure="correct",
@@ -52,7 +52,7 @@ def rich() -> Study:
         models={"full": "models", "AR": "ar", "simplified": "least.toml"},
         consent=Consent(version="2026-11"),
         questions=(Question(name="age", least=18, most=99), mood, craft),
-        plan=Plan(claims=(claim,), exclusions=("None.",), highest_share_at_ends=0.3),
+        plan=PlanSection(claims=(claim,), exclusions=("None.",), highest_share_at_ends=0.3),
         tasks={
             "absolute": TaskPlan(
                 participants=9,
@@ -95,7 +95,7 @@ def test_every_change_of_a_study_changes_its_hash() -> None:
         {"consent": Consent(version="2026-12")},
         {"questions": ()},
         {"questions": (*study.questions[:2], replace(study.questions[2], levels_text=SWAPPED))},
-        {"plan": Plan()},
+        {"plan": PlanSection()},
         {"calibration_days": 30},
         {"measured_force": True},
         {"models": {**study.models, "AR": "elsewhere"}},
@@ -290,10 +290,10 @@ def test_the_rule_of_verdicts_is_part_of_the_plan() -> None:
     assert (shipped.plan.rule, shipped.plan.few) == ("model", 0.15)
     fewer = replace(shipped.plan, few=0.1)
     assert len({p.sha256 for p in (shipped.plan, fewer, replace(shipped.plan, rule="tests"))}) == 3
-    assert Plan.read(fewer.to_dict()) == fewer
-    assert Plan.read({"rule": "model"}).few == 0.15
+    assert PlanSection.read(fewer.to_dict()) == fewer
+    assert PlanSection.read({"rule": "model"}).few == 0.15
     with refused(InputError, expected="model", got=[0.1, "tests"]):
-        Plan(few=0.1)
+        PlanSection(few=0.1)
     with refused(InputError, expected=8, got=7, names=["absolute", 'rule = "tests"']):
         replace(shipped, tasks={"absolute": replace(shipped.plan_of("absolute"), participants=7)})
     seven = {"absolute": replace(shipped.plan_of("absolute"), participants=7)}
@@ -357,7 +357,7 @@ def test_new_studies_without_anchors_have_to_name_their_catch_trials_or_to_want_
 def test_by_day_takes_as_many_people_as_make_whole_blocks() -> None:
     three = {"full": "a", "paper": "b", "simplified": "c"}
     plan = TaskPlan(participants=20, schedule="by-day", models=tuple(three))
-    shipped = replace(Study.load(), plan=Plan())
+    shipped = replace(Study.load(), plan=PlanSection())
     with refused(InputError, expected=[3, "participants"], got=20):
         replace(shipped, models=three, tasks={"absolute": plan})
     study = replace(shipped, models=three, tasks={"absolute": replace(plan, participants=21)})
@@ -377,4 +377,4 @@ def test_no_claim_about_a_task_without_ratings_or_right_answers(
     claim = {"name": "alike", "models": ("full", "simplified"), "test": "difference"}
     for task, measure in (("pair", "response_time_s"), ("threshold", "correct")):
         with refused(InputError, expected="alike", got=task):
-            Claim(**claim, task=task, measure=measure, bounds=(-0.1, 0.1))
+            ClaimSection(**claim, task=task, measure=measure, bounds=(-0.1, 0.1))

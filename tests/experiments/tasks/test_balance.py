@@ -25,7 +25,7 @@ from experiments.tasks.durations import (
 from experiments.tasks.page import plan_page, proof_of_sensitivity
 from modeling import InputError, TextureModel, Threshold
 from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.claims import Claim, Plan
+from modeling.files.claims import ClaimSection, PlanSection
 from tests.refusals import refused
 
 
@@ -167,7 +167,7 @@ def test_minutes_are_those_of_trials_and_breaks() -> None:
 
 @pytest.fixture
 def planned(study: Study) -> Study:
-    claim = Claim(
+    claim = ClaimSection(
         name="as alike",
         task="absolute",
         measure="magnitude_similarity",
@@ -183,7 +183,9 @@ def planned(study: Study) -> Study:
         break_after=4,
         anchors={"canvas": "PVC"},
     )
-    plan = Plan(claims=(claim,), exclusions=("Whoever takes it off.",), highest_share_at_ends=0.3)
+    plan = PlanSection(
+        claims=(claim,), exclusions=("Whoever takes it off.",), highest_share_at_ends=0.3
+    )
     return replace(study, plan=plan, tasks={**study.tasks, "absolute": anchored})
 
 
@@ -259,7 +261,7 @@ def test_the_page_says_which_rule_decides(planned: Study, models: ModelSets) -> 
 
 
 def test_the_page_keeps_the_seed_and_names_controls(planned: Study, models: ModelSets) -> None:
-    secret = replace(planned, seed=7_422_788_540_163_745, plan=Plan())
+    secret = replace(planned, seed=7_422_788_540_163_745, plan=PlanSection())
     same = {**models.sets["simplified"], "MDF": models.sets["full"]["MDF"]}
     page = plan_page(secret, ModelSets(sets={**models.sets, "simplified": same}))
     assert "7422788540163745" not in page
