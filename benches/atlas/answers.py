@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache, partial
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -16,13 +17,20 @@ from scipy import stats
 from scipy.optimize import brentq
 
 from analysis.statistics.paired import (
-    CONFIDENCE,
     d_z_interval,
     t_tests,
     without_rounding_noise,
 )
-from analysis.statistics.rates import bootstrap_intervals
 from benches.atlas.case import Axis, Case
+from benches.raters import (
+    ALPHA,
+    HIGHEST,
+    at_random,
+    bootstrap_covers,
+    covered,
+    mean_at_the_end,
+    paired_power,
+)
 from modeling.arrays import Bools, Floats
 from modeling.seeds import generator
 
@@ -33,13 +41,11 @@ STUDIES = {False: 2000, True: 6000}
 INTERVALS = {False: 90, True: 1500}  # of 300 one in ten counts would miss by chance
 BATCH = 30  # at once, for the memory
 RATERS, JUDGES, REPEATS = 20, 24, 3  # the default study (experiments/study/study.toml)
-HIGHEST = 100.0
 MEAN, PERSON_SD, DIFFERENCE_SD = 60.0, 10.0, 10.0
 # With these a paired t-test of 20 raters finds the difference in nine studies of ten.
 EFFECT = 0.765 * DIFFERENCE_SD
 CLEAR_EFFECT = 2.0 * DIFFERENCE_SD
 USUAL_RATE = 0.6
-ALPHA = 1 - CONFIDENCE
 NORMAL, WITH_CARELESS = 0.0, 0.1
 Test = Callable[[Floats], Floats]
 
@@ -55,7 +61,7 @@ def ratings(studies: int, raters: int, *, mean: float, effect: float) -> tuple[F
 def careless(shape: tuple[int, ...], share: float) -> tuple[Bools, Floats]:
     """Who answers at random, (studies, raters), and their two answers, uniform on the scale."""
     rng = generator([SEED, 1, *shape])
-    return rng.random(shape) < share, rng.uniform(0.0, HIGHEST, (2, *shape))
+    return rng.random(shape) < share, at_random(rng, (2, *shape))
 
 
 def t_p(differences: Floats) -> Floats:
@@ -86,14 +92,14 @@ def _found(test: Test, full: Floats, simplified: Floats) -> float:
 def power_lost_at_the_end(share: float, column: float, *, full: bool, test: Test) -> float:
     """The loss of power due to the end of the scale."""
     latent = ratings(STUDIES[full], RATERS, mean=_mean_near_the_end(share), effect=EFFECT)
-    seen = [np.minimum(one, HIGHEST) for one in latent]
+    seen = [np.minimum(one, HIGHEST) for one in latent]  # the lower end is far away
     return _found(test, *latent) - _found(test, *seen)
 
 
 def understated_at_the_end(share: float, column: float, *, full: bool) -> float:
     """Share by which the difference of means is smaller than that of the latent ratings."""
     latent = ratings(STUDIES[full], RATERS, mean=_mean_near_the_end(share), effect=EFFECT)
-    seen = [np.minimum(one, HIGHEST) for one in latent]
+    seen = [np.minimum(one, HIGHEST) for one in latent]  # the lower end is far away
     return float(1 - (seen[1] - seen[0]).mean() / (latent[1] - latent[0]).mean())
 
 
@@ -126,7 +132,7 @@ def effect_sizes_missed(count: float, column: float, *, full: bool) -> float:
     limits = [d_z_interval(t, n) for t in t_tests(latent[1] - latent[0])[0].tolist()]
     low, high = np.array(limits).T
     truth = EFFECT / DIFFERENCE_SD
-    return float(((truth < low) | (truth > high)).mean())
+    return float((~covered(low, truth, high)).mean())
 
 
 def rates_missed_with_few(count: float, column: float, *, full: bool) -> float:
@@ -147,8 +153,7 @@ def _rates_missed(rate: float, judges: int, *, full: bool) -> float:
     varied = np.flatnonzero(np.ptp(rates, axis=1) > 0)
     for start in range(0, varied.size, BATCH):
         some = varied[start : start + BATCH]
-        low, high = bootstrap_intervals(rates[some], generator([SEED, 3]))
-        held[some] = (low <= rate) & (rate <= high)
+        held[some] = bootstrap_covers(rates[some], rate, generator([SEED, 3]))
     return float(1 - held.mean())
 
 
@@ -158,7 +163,7 @@ def _latent_sd() -> float:
 
 def _mean_near_the_end(share: float) -> float:
     """Mean of the full model's latent ratings of which this share lies beyond the end."""
-    return float(HIGHEST + _latent_sd() * stats.norm.ppf(share))
+    return mean_at_the_end(share, sd=_latent_sd())
 
 
 # Where theory predicts failure.
@@ -178,14 +183,6 @@ def end_of_the_scale(column: float) -> float:
     return float(np.exp(brentq(understated, np.log(1e-4), np.log(0.99))))
 
 
-def power(effect: float, variance: float, count: float) -> float:
-    """Power of a paired t-test of normal differences (noncentral t)."""
-    shift = effect * np.sqrt(count / variance)
-    limit = stats.t.isf(ALPHA / 2, count - 1)
-    tails = stats.nct.sf(limit, count - 1, shift) + stats.nct.cdf(-limit, count - 1, shift)
-    return float(tails)
-
-
 @lru_cache(maxsize=1)
 def careless_share(column: float) -> float:
     """Where the power of a t-test has dropped, careless answers modelled as variance."""
@@ -198,7 +195,7 @@ def careless_share(column: float) -> float:
         attended = (1 - among) * (DIFFERENCE_SD**2 + EFFECT**2)
         variances = (attended + among * random - means**2) * RATERS / (RATERS - 1)
         variances[0] = DIFFERENCE_SD**2
-        powers = [power(m, v, RATERS) for m, v in zip(means, variances, strict=True)]
+        powers = [paired_power(m / sqrt(v), RATERS) for m, v in zip(means, variances, strict=True)]
         expected = float(stats.binom.pmf(k, RATERS, share) @ powers)
         return powers[0] - expected - POWER_LOST
 
@@ -209,7 +206,7 @@ def fewest_for_t(column: float) -> float:
     """Number of raters at which a t-test still has the required power."""
 
     def surplus(count: float) -> float:
-        return power(CLEAR_EFFECT, DIFFERENCE_SD**2, count) - (1 - POWER_LOST)
+        return paired_power(CLEAR_EFFECT / DIFFERENCE_SD, count) - (1 - POWER_LOST)
 
     return float(brentq(surplus, 2.5, 20.0))
 

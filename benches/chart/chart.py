@@ -18,8 +18,9 @@ from benches.chart.summary import (
     summarised,
 )
 from benches.chart.surfaces import Kind
-from benches.chart.timing import KEY, TURNS, Key, Run, stream_of, time_table
+from benches.chart.timing import KEY, TURNS, Key, stream_of, time_table
 from benches.rendering.bench import processor
+from benches.rendering.timer import Turn
 from modeling import InputError
 
 
@@ -87,9 +88,9 @@ def chart_of(judged: Sequence[Judged], *, turns: int = TURNS) -> Chart:
     )
 
 
-def _streams(judged: Sequence[Judged]) -> tuple[dict[Key, tuple[Run, int]], list[str]]:
+def _streams(judged: Sequence[Judged]) -> tuple[dict[Key, Turn], list[str]]:
     """Of the first texture of each kind, and why some cannot be timed."""
-    streams: dict[Key, tuple[Run, int]] = {}
+    streams: dict[Key, Turn] = {}
     untimed: dict[str, None] = {}
     first = {one.source.kind: one for one in reversed(judged) if len(one.rows)}
     for kind, one in first.items():

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from benches.chart.rival_costs import COST_RATE_HZ
 from benches.chart.rival_fits import Filtered, Grained, Looped, Shaped
 from benches.rendering.coefficients import BandTable
 from benches.rendering.rivals import BANDS, COEFFICIENTS, CompiledStream, SoundStream
+from benches.rendering.timer import Turn, turn_ns
 from modeling import Renderer
 from modeling.hand import Hand
 
@@ -25,13 +25,12 @@ SAMPLES = 4096
 SPEEDS_MM_S, FORCES_N = (60.0, 300.0), (1.0, 3.0)
 _BLOCKS = 8  # of FFT-shaped noise in a turn
 
-Run = Callable[[], object]
 # Kind of surface, method, blending, update interval (ms) and precision of a row.
 Key = tuple[str, str, str, float, str]
 KEY = ["kind", "method", "blending", "update_ms", "precision"]
 
 
-def time_table(streams: Mapping[Key, tuple[Run, int]], *, turns: int = TURNS) -> pd.DataFrame:
+def time_table(streams: Mapping[Key, Turn], *, turns: int = TURNS) -> pd.DataFrame:
     """Nanoseconds per rendered sample: median and quartiles over the turns.
 
     In every turn each stream renders a few thousand samples; the first turns warm up. So whatever
@@ -39,7 +38,7 @@ def time_table(streams: Mapping[Key, tuple[Run, int]], *, turns: int = TURNS) ->
 
     Parameters
     ----------
-    streams : mapping of Key to (callable, samples per call)
+    streams : mapping of Key to Turn
     turns : int
 
     Returns
@@ -49,12 +48,9 @@ def time_table(streams: Mapping[Key, tuple[Run, int]], *, turns: int = TURNS) ->
     """
     taken = {key: np.empty(turns) for key in streams}
     for turn in range(-WARM_UP, turns):
-        for key, (run, count) in streams.items():
-            start = perf_counter()
-            run()
-            seconds = perf_counter() - start
+        for key, one in turn_ns(streams).items():
             if turn >= 0:
-                taken[key][turn] = 1e9 * seconds / count
+                taken[key][turn] = one
     rows = []
     for key, ns in taken.items():
         low, median, high = np.percentile(ns, [25, 50, 75])
@@ -62,29 +58,28 @@ def time_table(streams: Mapping[Key, tuple[Run, int]], *, turns: int = TURNS) ->
     return pd.DataFrame(rows, columns=[*KEY, "ns", "ns_25", "ns_75"])
 
 
-def stream_of(fitted: Fitted, update_ms: float, *, single: bool) -> tuple[Run, int] | None:
-    """What renders at 5 kHz along a moving hand, and how many samples; None of what is not timed.
+def stream_of(fitted: Fitted, update_ms: float, *, single: bool) -> Turn | None:
+    """What renders at 5 kHz along a moving hand; None of what is not timed.
 
     Layers by the program's renderer, in double or single precision; other filters and stored sounds
     by C written with equal care, FFT-shaped noise by NumPy.
     """
     hand, period = _hand(), update_samples(update_ms, COST_RATE_HZ)
     if isinstance(fitted, Shaped):
-        return _shaped_stream(fitted), _BLOCKS * fitted.model.block // 2
+        return Turn(_shaped_stream(fitted), _BLOCKS * fitted.model.block // 2)
     if isinstance(fitted, Layered):
         renderer = Renderer(fitted.at_cost_rate, update_samples=period, single=single)
-        if single:
-            return partial(renderer.render, *hand, out=np.empty(SAMPLES, dtype=np.float32)), SAMPLES
-        return partial(renderer.render, *hand, out=np.empty(SAMPLES)), SAMPLES
+        own = np.empty(SAMPLES, dtype=np.float32 if single else np.float64)
+        return Turn(partial(renderer.render, *hand, out=own), SAMPLES)
     out = np.empty(SAMPLES)
     if isinstance(fitted, Filtered):
         table = replace(fitted.model, rate_hz=COST_RATE_HZ)
         kind = BANDS if isinstance(table, BandTable) else COEFFICIENTS
         stream = CompiledStream(kind, table, update_samples=period, seed=0)
-        return stream.calls(*hand, out, block=SAMPLES), SAMPLES
+        return Turn(stream.calls(*hand, out, block=SAMPLES), SAMPLES)
     if isinstance(fitted, Looped | Grained):
         sounds = SoundStream(fitted.model, update_samples=period, seed=0)
-        return sounds.calls(*hand, out), SAMPLES
+        return Turn(sounds.calls(*hand, out), SAMPLES)
     return None
 
 
@@ -92,7 +87,7 @@ def _hand() -> Hand:
     return Hand(np.linspace(*SPEEDS_MM_S, SAMPLES), np.linspace(*FORCES_N, SAMPLES))
 
 
-def _shaped_stream(fitted: Shaped) -> Run:
+def _shaped_stream(fitted: Shaped) -> Callable[[], object]:
     rng: Any = np.random.default_rng(0)
     ends = (SPEEDS_MM_S, FORCES_N)
     places = np.stack([np.linspace(*end, _BLOCKS) for end in ends], axis=1).tolist()

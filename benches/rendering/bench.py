@@ -10,12 +10,11 @@ import platform
 import subprocess
 import sys
 import sysconfig
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
-from time import perf_counter
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -38,6 +37,7 @@ from benches.rendering.rivals import (
     predictor_of,
 )
 from benches.rendering.stored_sounds import Loops, make_loops
+from benches.rendering.timer import Turn, turn_ns
 from modeling import Renderer, TextureModel
 from modeling.arrays import Floats
 from modeling.hand import Hand
@@ -66,8 +66,6 @@ _IMPORT = (
     "from time import perf_counter; start = perf_counter(); import modeling; "
     "print(perf_counter() - start)"
 )
-
-Name = TypeVar("Name")
 
 
 @dataclass(frozen=True)
@@ -259,14 +257,6 @@ class Setting(NamedTuple):
     update_samples: int
 
 
-class Turn(NamedTuple):
-    """What is timed as a whole in each turn: a call, how many samples it makes, how often."""
-
-    run: Callable[[], object]
-    samples: int
-    repeats: int = 1
-
-
 def bench_rendering(
     effort: BenchEffort | None = None, *, progress: Callable[[str], None] = lambda part: None
 ) -> RenderingBench:
@@ -297,7 +287,7 @@ def bench_rendering(
             work |= _by_block(layers, block, effort)
     best = dict.fromkeys(work, np.inf)
     for turn in range(effort.turns):
-        for setting, ns in _turn_ns(work).items():
+        for setting, ns in turn_ns(work).items():
             best[setting] = min(best[setting], ns)
         progress(f"turn {turn + 1} of {effort.turns}")
     import_s = _import_s(effort.starts)
@@ -413,17 +403,6 @@ def _in_calls(stream: CompiledStream, effort: BenchEffort, *, block: int | None 
     count = effort.samples
     hand = stroke(count, rate_hz=RATE_HZ)
     return Turn(stream.calls(*hand, np.empty(count), block=block or count), count)
-
-
-def _turn_ns(work: Mapping[Name, Turn]) -> dict[Name, float]:
-    """One turn of everything: ns per sample, of what is repeated the best."""
-    best = dict.fromkeys(work, np.inf)
-    for name, turn in work.items():
-        for _ in range(turn.repeats):
-            start = perf_counter()
-            turn.run()
-            best[name] = min(best[name], 1e9 * (perf_counter() - start) / turn.samples)
-    return best
 
 
 def _import_s(starts: int) -> float:

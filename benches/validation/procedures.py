@@ -20,7 +20,17 @@ from analysis.chapters.single_answers.gee import fit_gee
 from analysis.statistics.equivalence import ALPHA, Bounds, one_sided_tests
 from analysis.statistics.mixed import fit_mixed, t_of
 from analysis.statistics.paired import CONFIDENCE, d_z_interval, holm, sign_flips_p, t_tests
-from analysis.statistics.rates import bootstrap_intervals, clopper_pearson
+from analysis.statistics.rates import clopper_pearson
+from benches.raters import (
+    HIGHEST,
+    LOWEST,
+    at_random,
+    bootstrap_covers,
+    covered,
+    ended,
+    mean_at_the_end,
+    paired_power,
+)
 from modeling.arrays import Floats
 from modeling.checks import check_whole
 from modeling.files.columns import Column, names
@@ -96,17 +106,16 @@ def _heavy_tails(rng: np.random.Generator, shape: tuple[int, int], truth: float)
 def _ceiling(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> Floats:
     """Latent ratings that end at 100, where `AT_END` of the reference's lie."""
     noise_sd = DIFFERENCE_SD / sqrt(2)
-    middle = 100 + float(stats.norm.ppf(AT_END)) * float(np.hypot(PERSON_SD, noise_sd))
+    middle = mean_at_the_end(AT_END, sd=float(np.hypot(PERSON_SD, noise_sd)))
     latent = rng.normal(middle, PERSON_SD, shape)[..., None] + rng.normal(0, noise_sd, (*shape, 2))
-    ended: Floats = np.clip(latent + np.array([0.0, truth]), 0.0, 100.0)
-    return ended
+    return ended(latent + np.array([0.0, truth]))
 
 
 def _careless(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> Floats:
     """Some participants answer at random, uniformly over the scale."""
     ratings = _normal(rng, shape, truth)
     random = rng.random(shape) < CARELESS
-    ratings[random] = rng.uniform(0, 100, (*shape, 2))[random]
+    ratings[random] = at_random(rng, (*shape, 2))[random]
     return ratings
 
 
@@ -176,7 +185,7 @@ def _differences(ratings: Floats) -> Floats:
 def _t_covers(ratings: Floats, truth: float, rng: np.random.Generator) -> Hits:
     def judge(differences: Floats) -> Hits:
         *_, low, high = t_tests(differences)
-        return (low <= truth) & (truth <= high)
+        return covered(low, truth, high)
 
     return _hits_of_rows(_differences(ratings), judge)
 
@@ -205,7 +214,7 @@ def _equivalent(ratings: Floats, truth: float, rng: np.random.Generator) -> Hits
 
 def _equivalent_by_guard(ratings: Floats, truth: float, rng: np.random.Generator) -> Hits:
     """Equivalent, and few enough ratings at an end of the scale."""
-    at_end = (ratings <= 0) | (ratings >= 100)
+    at_end = (ratings <= LOWEST) | (ratings >= HIGHEST)
     answered = np.isfinite(ratings).sum(axis=(1, 2))
     few = at_end.sum(axis=(1, 2)) <= HIGHEST_SHARE_AT_ENDS * answered
     found: Hits = _equivalent(ratings, truth, rng) & few
@@ -216,8 +225,7 @@ def _d_z_covers(ratings: Floats, truth: float, rng: np.random.Generator) -> Hits
     def judge(differences: Floats) -> Hits:
         n = differences.shape[1]
         limits = np.array([d_z_interval(float(t), n) for t in t_tests(differences)[0]])
-        d_z = truth / DIFFERENCE_SD
-        return (limits[:, 0] <= d_z) & (d_z <= limits[:, 1])
+        return covered(limits[:, 0], truth / DIFFERENCE_SD, limits[:, 1])
 
     return _hits_of_rows(_differences(ratings), judge)
 
@@ -230,15 +238,7 @@ def _flips_reject(ratings: Floats, truth: float, rng: np.random.Generator) -> Hi
 
 
 def _bootstrap_covers(rates: Floats, truth: float, rng: np.random.Generator) -> Hits:
-    def judge(complete: Floats) -> Hits:
-        hits = np.zeros(len(complete), dtype=bool)
-        vary = np.ptp(complete, axis=1) > 0
-        if vary.any():
-            low, high = bootstrap_intervals(complete[vary], rng)
-            hits[vary] = (low <= truth) & (truth <= high)
-        return hits
-
-    return _hits_of_rows(rates, judge)
+    return _hits_of_rows(rates, lambda complete: bootstrap_covers(complete, truth, rng))
 
 
 def _confusions(
@@ -259,7 +259,7 @@ def _information_covers(counts: Floats, truth: float, rng: np.random.Generator) 
     pooled = truth * np.eye(TEXTURES) + (1 - truth) * (1 - np.eye(TEXTURES)) / (TEXTURES - 1)
     bits = float(information_bits(pooled))
     found = [transferred_information(each) for each in counts]
-    return np.array([one.ci_low <= bits <= one.ci_high for one in found])
+    return covered([one.ci_low for one in found], bits, [one.ci_high for one in found])
 
 
 def _single_ratings(
@@ -326,9 +326,7 @@ def t_test_power(n: int, truth: float) -> float:
     truth : float
         True mean difference, in points, where the SD of differences is `DIFFERENCE_SD`.
     """
-    from pingouin import power_ttest  # late: it takes a second to import
-
-    return float(power_ttest(d=truth / DIFFERENCE_SD, n=n, contrast="paired", alpha=ALPHA))
+    return paired_power(truth / DIFFERENCE_SD, n)
 
 
 def equivalence_power(

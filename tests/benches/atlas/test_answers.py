@@ -15,6 +15,7 @@ from benches.atlas import answers
 from benches.atlas.answers import BOOTSTRAP, CASES, D_Z, RANKS, RATERS, T
 from benches.atlas.case import FAILS, HOLDS, Case
 from benches.atlas.edges import examine
+from benches.raters import paired_power
 
 NEVER = [case for case in CASES if case.theory is answers.never]
 
@@ -57,14 +58,14 @@ def test_five_signs_alike_are_not_significant_and_six_are() -> None:
 
 
 def test_power_is_that_of_the_noncentral_t() -> None:
-    power = answers.power(answers.EFFECT, answers.DIFFERENCE_SD**2, RATERS)
+    power = paired_power(answers.EFFECT / answers.DIFFERENCE_SD, RATERS)
     assert power == pytest.approx(0.9, abs=0.005)
     full, simplified = answers.ratings(6000, RATERS, mean=60.0, effect=answers.EFFECT)
     found = (answers.t_p(simplified - full) < 0.05).mean()
     assert found == pytest.approx(power, abs=0.012)
     for count in (3, 4, 6):
         missed = case_of("raters", T, "clear").measure(float(count), np.nan, full=True)
-        expected = 1 - answers.power(answers.CLEAR_EFFECT, answers.DIFFERENCE_SD**2, count)
+        expected = 1 - paired_power(answers.CLEAR_EFFECT / answers.DIFFERENCE_SD, count)
         assert missed == pytest.approx(expected, abs=0.02)
 
 

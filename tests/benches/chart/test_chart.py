@@ -15,6 +15,7 @@ from benches.chart.judging import Judged
 from benches.chart.page import COSTS, MEASURES, chart_files, chart_section, chart_tables
 from benches.chart.surfaces import counted_kind
 from benches.chart.timing import stream_of, time_table
+from benches.rendering.timer import Turn
 
 
 def test_rendering_is_timed_in_turn_and_what_cannot_be_is_not(chart: Chart) -> None:
@@ -32,7 +33,7 @@ def test_rendering_is_timed_in_turn_and_what_cannot_be_is_not(chart: Chart) -> N
 def test_turns_are_taken_by_all_in_the_same_order() -> None:
     calls: list[str] = []
     streams = {
-        ("drawn", name, "", 1.0, "double"): ((lambda name=name: calls.append(name)), 1)
+        ("drawn", name, "", 1.0, "double"): Turn(lambda name=name: calls.append(name), 1)
         for name in ("a", "b")
     }
     table = time_table(streams, turns=3)
@@ -43,8 +44,7 @@ def test_turns_are_taken_by_all_in_the_same_order() -> None:
 def test_fft_shaped_noise_renders_as_many_samples_as_are_counted(judged: list[Judged]) -> None:
     stream = stream_of(judged[0].fitted["FFT, 1/16 s", ""], 1.0, single=False)
     assert stream is not None
-    run, count = stream
-    assert np.size(run()) == count
+    assert np.size(stream.run()) == stream.samples
 
 
 def test_the_picture_names_its_axes_and_says_that_it_is_simulated(chart: Chart) -> None:

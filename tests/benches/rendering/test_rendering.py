@@ -26,8 +26,6 @@ from benches.rendering.bench import (
     UPDATES,
     BenchEffort,
     RenderingBench,
-    Turn,
-    _turn_ns,
     bench_rendering,
     stroke,
 )
@@ -155,20 +153,6 @@ def test_ratios_and_verdicts_of_known_times() -> None:
         assert verdicts["sosfilt / Renderer", f"layers {layers}, blocks of 1024"]
     assert verdicts["cost is linear in layers: R²"].all()
     assert not verdicts["import modeling, s"].any()
-
-
-def test_turns_are_timed_one_by_one_and_the_best_counts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Five blocks of a slow filter are five measurements, not one of five times the length."""
-    taken = iter([3.0, 2.0, 4.0, 10.0] * 2)  # seconds that each run takes
-    now = [0.0]
-    monkeypatch.setattr("benches.rendering.bench.perf_counter", lambda: now[0])
-
-    def run() -> None:
-        now[0] += next(taken)
-
-    for _ in range(2):
-        found = _turn_ns({"slow": Turn(run, 2, repeats=3), "fast": Turn(run, 100)})
-        assert found == {"slow": pytest.approx(1e9), "fast": pytest.approx(1e8)}
 
 
 @pytest.mark.parametrize("layers", LAYERS)

@@ -13,7 +13,6 @@ from benches.validation.procedures import (
     cells,
     equivalence_power,
     simulate_cell,
-    t_test_power,
 )
 from modeling import InputError
 from tests.refusals import refused
@@ -62,13 +61,6 @@ def test_power_of_equivalence_at_a_bound_is_the_level_of_one_test():
     assert equivalence_power(8, 7.5) == pytest.approx(equivalence_power(8, -7.5))
     assert equivalence_power(2, 0.0) < equivalence_power(8, 0.0) < equivalence_power(20, 0.0)
     assert equivalence_power(5000, 0.0) == pytest.approx(1.0, abs=1e-6)
-
-
-def test_power_of_t_is_that_of_noncentral_t():
-    critical = stats.t.ppf(0.975, 19)
-    shift = 7.5 / 11 * np.sqrt(20)
-    known = stats.nct.sf(critical, 19, shift) + stats.nct.cdf(-critical, 19, shift)
-    assert t_test_power(20, 7.5) == pytest.approx(known, abs=1e-9)
 
 
 @pytest.mark.parametrize(
