@@ -13,7 +13,7 @@ from typing import TextIO
 from rich.console import Console
 from rich.markup import escape
 
-from experiments.sessions.surfaces import SessionAborted, Standing
+from experiments.sessions.surfaces import ProgressReport, SessionAborted
 
 STOP = "stop"
 PAGES = {
@@ -64,7 +64,7 @@ class Terminal:
         self._asked = False
         self._forget_lines()
 
-    def tell(self, standing: Standing) -> None:
+    def tell(self, standing: ProgressReport) -> None:
         """Show the progress of the session and the state of the rig."""
         training = standing.phase == "training"
         parts = ["training" if training else f"{standing.done} of {standing.of} trials done"]

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Source:
+class TextureSource:
     """One texture in one folder of recordings."""
 
     folder: Path
@@ -35,7 +35,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TextureOutcome:
     """What modelling one texture led to.
 
     Parameters
@@ -60,14 +60,14 @@ class _Made:
 
     Parameters
     ----------
-    outcome : Outcome
+    outcome : TextureOutcome
     files : mapping of str to bytes
         By the ending of their names.
     provenance : mapping
         Of the files; empty without them.
     """
 
-    outcome: Outcome
+    outcome: TextureOutcome
     files: Mapping[str, bytes] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
@@ -96,7 +96,7 @@ class HowToModel:
 
 def model_textures(
     folders: Sequence[Path], out: Path, *, how: HowToModel, jobs: int | None
-) -> list[Outcome]:
+) -> list[TextureOutcome]:
     """Model every texture in these folders, some at a time; what came of each, in order.
 
     One that cannot be modelled does not stop the others.
@@ -123,10 +123,10 @@ def model_textures(
 
 
 def _model_all(
-    sources: Sequence[Source], out: Path, *, how: HowToModel, jobs: int | None
-) -> list[Outcome]:
+    sources: Sequence[TextureSource], out: Path, *, how: HowToModel, jobs: int | None
+) -> list[TextureOutcome]:
     """Outcomes in the order of the sources, with a progress bar."""
-    outcomes: dict[int, Outcome] = {}
+    outcomes: dict[int, TextureOutcome] = {}
     work = partial(_model_one, out=out, how=how)
     with progress("Finding layers, fitting", len(sources)) as advance:
         try:
@@ -144,14 +144,14 @@ def _model_all(
     return [outcomes[number] for number in range(len(sources))]
 
 
-def _start(source: Source, out: Path) -> Path:
+def _start(source: TextureSource, out: Path) -> Path:
     """What the names of a texture's files begin with."""
     from modeling.files.writing import file_stem
 
     return out / file_stem(source.texture)
 
 
-def _write(made: _Made, start: Path, *, texture: str) -> Outcome:
+def _write(made: _Made, start: Path, *, texture: str) -> TextureOutcome:
     """Write a texture's files, all or none; what is wrong becomes the outcome's error."""
     if made.outcome.error:
         return made.outcome
@@ -160,11 +160,11 @@ def _write(made: _Made, start: Path, *, texture: str) -> Outcome:
     try:
         write_own_files(contents, note, made.provenance, texture=texture)
     except (ValueError, OSError) as error:
-        return Outcome(made.outcome.what, error=sentence_of(error))
+        return TextureOutcome(made.outcome.what, error=sentence_of(error))
     return made.outcome
 
 
-def _model_one(source: Source, *, out: Path, how: HowToModel) -> _Made:
+def _model_one(source: TextureSource, *, out: Path, how: HowToModel) -> _Made:
     """Load and model one texture; what is wrong with it becomes its outcome's error."""
     from analysis.spectra.findings import find_in, findings_files
     from modeling.files.hashes import sha256_of_paths
@@ -195,7 +195,7 @@ def _model_one(source: Source, *, out: Path, how: HowToModel) -> _Made:
             }
             provenance = provenance_of("model", settings, inputs=inputs)
     except (ValueError, OSError, MemoryError) as error:
-        return _Made(Outcome(what, error=sentence_of(error)))
+        return _Made(TextureOutcome(what, error=sentence_of(error)))
     notes = (*_rate_notes(records), *_findings(found, _start(source, out), plot=how.plot))
     warnings = (
         *left_out_warnings(source.texture, unusable),
@@ -203,7 +203,7 @@ def _model_one(source: Source, *, out: Path, how: HowToModel) -> _Made:
         *_mended(found),
         *_doubts(found),
     )
-    outcome = Outcome(what, notes=notes, warnings=warnings)
+    outcome = TextureOutcome(what, notes=notes, warnings=warnings)
     return _Made(outcome, files, provenance)
 
 
@@ -316,28 +316,28 @@ def recording_folders(folder: Path) -> list[Path]:
     return below or [folder]
 
 
-def _sources_in(folders: Iterable[Path]) -> tuple[list[Source], list[Outcome]]:
+def _sources_in(folders: Iterable[Path]) -> tuple[list[TextureSource], list[TextureOutcome]]:
     """All textures in these folders, and the folders whose list cannot be read."""
     from modeling.recordings.recording_set import textures_in
 
-    sources: list[Source] = []
-    unreadable: list[Outcome] = []
+    sources: list[TextureSource] = []
+    unreadable: list[TextureOutcome] = []
     for folder in (found for given in folders for found in recording_folders(given)):
         try:
             # A list without lines names no texture: loading it will say so.
             names = textures_in(folder) or (folder.name,)
         except (ValueError, OSError) as error:
-            unreadable.append(Outcome(str(folder), error=sentence_of(error)))
+            unreadable.append(TextureOutcome(str(folder), error=sentence_of(error)))
             continue
-        sources += [Source(folder, name) for name in names]
+        sources += [TextureSource(folder, name) for name in names]
     return sources, unreadable
 
 
-def _require_own_files(sources: Iterable[Source], out: Path) -> None:
+def _require_own_files(sources: Iterable[TextureSource], out: Path) -> None:
     """Refuse textures whose files would overwrite each other's or another command's."""
     from analysis.spectra.findings import ENDINGS
 
-    taken: dict[Path, Source] = {}
+    taken: dict[Path, TextureSource] = {}
     for source in sources:
         start = _start(source, out)
         if start in taken:

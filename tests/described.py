@@ -16,7 +16,7 @@ from typing import Any
 
 from msgspec import inspect
 
-from modeling.files.described import DescribedFile, Key, Section, keys_of
+from modeling.files.described import DescribedFile, FileSection, Key, keys_of
 
 Values = dict[str, Any]
 
@@ -29,7 +29,7 @@ class Kind:
     ----------
     name : str
         Of the file, with its suffix.
-    section : type of Section
+    section : type of FileSection
         Its declaration.
     examples : tuple of dict
         Plain values of good files, in which together every key stands.
@@ -44,7 +44,7 @@ class Kind:
     """
 
     name: str
-    section: type[Section]
+    section: type[FileSection]
     examples: tuple[Values, ...]
     load: Callable[[Path], Any]
     write: Callable[[Values], str]
@@ -84,7 +84,7 @@ def places(kind: Kind) -> Iterator[Place]:
                 yield place
 
 
-def declared(section: type[Section]) -> Iterator[str]:
+def declared(section: type[FileSection]) -> Iterator[str]:
     """Every key that is declared, as `Place` names it."""
     yield from _declared(section.WHERE, keys_of(section))
 
@@ -96,7 +96,7 @@ def _declared(where: str, keys: tuple[Key, ...]) -> Iterator[str]:
         yield from _declared(key.within(where), key.keys)
 
 
-def _places(section: type[Section], values: Values, number: int) -> Iterator[Place]:
+def _places(section: type[FileSection], values: Values, number: int) -> Iterator[Place]:
     head = section.WHERE.strip("[]") if issubclass(section, DescribedFile) else ""
     for key in keys_of(section):
         way = (head,) if head and not key.is_table else ()

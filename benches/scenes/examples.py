@@ -25,7 +25,7 @@ from modeling.rendering.cost import Cost
 from modeling.scenes.compiled import CompiledTexture
 from modeling.scenes.compiler import compile_scenes
 from modeling.scenes.cost import stored_numbers
-from modeling.scenes.measures import Errors, Yardstick, errors_between
+from modeling.scenes.measures import ComparedBand, Errors, errors_between
 from modeling.scenes.places import Places, enclosing, places_of
 from modeling.scenes.strokes import Windows, windows_kept
 from stimuli.planted.drawn import draw_surface
@@ -196,7 +196,7 @@ def _nodes_within(places: Places, model: ARModel | CoefficientTable) -> int:
 def _judged(texture: CompiledTexture, scene: Scene, surface: Surface) -> dict[str, Errors]:
     """Errors of each method against the truth, at the places of the scene that count."""
     places = places_of(texture.full, scene.hand)
-    yardstick = Yardstick.of(texture.full, band_hz=scene.actuator.band_hz)
+    yardstick = ComparedBand.of(texture.full, band_hz=scene.actuator.band_hz)
     speed, force = places.visited
     conditions = list(zip(speed.tolist(), force.tolist(), strict=True))
     truth = yardstick.features_of(

@@ -34,7 +34,7 @@ class Mouse:
             self._events.append((kind, ((x - width / 2) / height, (y - height / 2) / height)))
 
 
-class Key(NamedTuple):
+class KeyPress(NamedTuple):
     """A press of a key: its small name ("tab", "enter", "7", "left"), with shift or ctrl held."""
 
     name: str
@@ -53,7 +53,7 @@ class Keys:
 
         self._names = key
         self._handle = window.winHandle
-        self._presses: list[Key] = []
+        self._presses: list[KeyPress] = []
         window.winHandle.push_handlers(
             on_key_press=self._press,
             on_key_release=self._release,
@@ -61,7 +61,7 @@ class Keys:
             on_text_motion_select=lambda motion: self._add(motion, shift=True),
         )
 
-    def take(self) -> list[Key]:
+    def take(self) -> list[KeyPress]:
         """The presses since the last call, in order."""
         presses, self._presses = self._presses, []
         return presses
@@ -88,5 +88,5 @@ class Keys:
         name = self._names.symbol_string(symbol).lower().removeprefix("motion_")
         name = name.removeprefix("num_").removeprefix("_")
         same = {"return": "enter", "previous_page": "pageup", "next_page": "pagedown"}
-        self._presses.append(Key(same.get(name, name), shift, ctrl))
+        self._presses.append(KeyPress(same.get(name, name), shift, ctrl))
         return True

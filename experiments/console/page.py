@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from experiments.console.drawing import Point
-from experiments.console.events import EventKind, Key
+from experiments.console.events import EventKind, KeyPress
 from experiments.console.widgets import Button, FocusRing, Widget
 
 
@@ -65,7 +65,7 @@ class Page:
             widget, self._held = self._held, None
             widget.release(point)
 
-    def handle_key(self, key: Key) -> None:
+    def handle_key(self, key: KeyPress) -> None:
         """Move the focus, press the button of a shortcut, or pass the key on."""
         shortcut = self._shortcuts.get(f"ctrl+{key.name}" if key.ctrl else key.name)
         if key.ctrl and shortcut is None:
@@ -73,7 +73,7 @@ class Page:
         if key.name == "tab":
             self._move_focus(-1 if key.shift else 1)
         elif shortcut is not None:
-            shortcut.key(Key("enter"))
+            shortcut.key(KeyPress("enter"))
         elif self._focus is not None:
             self._focus.key(key)
 

@@ -8,10 +8,10 @@ from functools import partial
 from typing import Any
 
 from experiments.console.drawing import ORANGE
-from experiments.console.events import Key, Keys, Mouse
+from experiments.console.events import KeyPress, Keys, Mouse
 from experiments.console.languages import Texts
 from experiments.console.page import Page
-from experiments.console.parts import Parts
+from experiments.console.parts import PageParts
 from experiments.console.widgets import Button, FocusRing, Widget
 from experiments.sessions.surfaces import Note, SessionAborted, Surfaces
 
@@ -31,7 +31,7 @@ def _unheard(event: str, **fields: object) -> None:
     """Where events go before anybody listens."""
 
 
-class PageRunner(Parts):
+class PageRunner(PageParts):
     """A window on which pages are shown, one after another.
 
     Parameters
@@ -162,7 +162,7 @@ class PageRunner(Parts):
             if self._finished or self._wants_to_stop:
                 return
 
-    def _key(self, page: Page, key: Key) -> None:
+    def _key(self, page: Page, key: KeyPress) -> None:
         if key.name == "escape":
             self._ask_soon()
         else:

@@ -29,7 +29,7 @@ FOOT_HEIGHT = 0.02
 BAR = (0.24, 0.006)
 
 
-class Parts:
+class PageParts:
     """Makes the parts of pages.
 
     Parameters

@@ -33,7 +33,7 @@ def rate(runner: PageRunner, trial: RatedTrial, surfaces: Surfaces) -> Rating:
         action=surfaces.present_virtual,
     )
     proceed = runner.proceed()
-    needed = _Line(runner, y=-0.305)
+    needed = _ChangingRemark(runner, y=-0.305)
 
     def update() -> None:
         shows_real = surfaces.shows_real if surfaces.started else _begins_real(trial)
@@ -73,7 +73,7 @@ def choose(runner: PageRunner, task: Task, surfaces: Surfaces) -> Choice:
     numbered = [_numbered(runner, index, surfaces) for index in range(surfaces.count)]
     answers = [_answer(runner, index, surfaces) for index in range(surfaces.count)]
     confirm = runner.proceed(of("choice.confirm"), y=-0.36)
-    told = _Line(runner, y=-0.27)
+    told = _ChangingRemark(runner, y=-0.27)
 
     def update() -> None:
         # What the page announces: the task begins with it.
@@ -194,7 +194,7 @@ def _told(of: Callable[..., str], surfaces: Surfaces) -> str:
     return told
 
 
-class _Line:
+class _ChangingRemark:
     """A remark whose words change; its stimulus is created again when they do."""
 
     def __init__(self, runner: PageRunner, *, y: float) -> None:

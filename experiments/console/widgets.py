@@ -24,7 +24,7 @@ from experiments.console.drawing import (
     rounded,
     text,
 )
-from experiments.console.events import Key
+from experiments.console.events import KeyPress
 
 PRESSING = ("enter", "space")
 # How far a key moves a marker, in points; with shift, ten times as far.
@@ -64,7 +64,7 @@ class Widget(Protocol):
         """Forget a press whose end will not be reported."""
         ...
 
-    def key(self, key: Key) -> None:
+    def key(self, key: KeyPress) -> None:
         """A key was pressed while the widget had the focus."""
         ...
 
@@ -153,7 +153,7 @@ class Button:
         """Forget that the button is held."""
         self._held = False
 
-    def key(self, key: Key) -> None:
+    def key(self, key: KeyPress) -> None:
         """Act at Enter or Space, while enabled."""
         if self.enabled and key.name in PRESSING:
             self._action()
@@ -276,7 +276,7 @@ class RatingScale:
         """Put the marker back to the rating, if there is one."""
         self._slider.markerPos = self._slider.getRating()
 
-    def key(self, key: Key) -> None:
+    def key(self, key: KeyPress) -> None:
         """Move the marker by a point, or by ten.
 
         The first key puts it to the end from which it would come: to the right, to 0; to the

@@ -22,11 +22,11 @@ from experiments.feel.plots import (
 from experiments.feel.rigs import HandNow
 from experiments.feel.textures import Texture
 from experiments.feel.view import (
+    FeltCriterion,
     FeltLayers,
     ModelNow,
     Now,
     Place,
-    Yardstick,
     felt_words,
     level_words,
     short,
@@ -114,7 +114,7 @@ def density_scale(low: float, high: float) -> Scale:
     return Scale(ends=(low, high), kind="log", ticks=ticks, labels=labels)
 
 
-class SpectrumPanel:
+class SpectrumPlot:
     """Spectra of the full and of the simplified model at the hand's speed and force."""
 
     def __init__(
@@ -177,7 +177,7 @@ class LayerPanel:
         *,
         highest_hz: float,
         amplitude: tuple[float, float],
-        yardstick: Yardstick,
+        yardstick: FeltCriterion,
         most_layers: int,
     ) -> None:
         left, bottom, right, top = box
@@ -210,7 +210,7 @@ class LayerPanel:
         """What never changes."""
         return self._fixed
 
-    def _threshold(self, window: Any, yardstick: Yardstick, *, highest_hz: float) -> list[Any]:
+    def _threshold(self, window: Any, yardstick: FeltCriterion, *, highest_hz: float) -> list[Any]:
         threshold = yardstick.threshold
         end, last = threshold.valid_range_hz[1], float(threshold.acceleration_g[-1])
         known = threshold.frequency_hz <= highest_hz
@@ -223,7 +223,7 @@ class LayerPanel:
                 parts.append(line(window, held, color=PURPLE, width=3))
         return parts
 
-    def _legend(self, window: Any, box: Box, yardstick: Yardstick) -> list[Any]:
+    def _legend(self, window: Any, box: Box, yardstick: FeltCriterion) -> list[Any]:
         left, bottom, right, top = box
         y = top - 0.066
         entries = [(0.09, INK, f"threshold ({short(yardstick.threshold.name, 9)})")]

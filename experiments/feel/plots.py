@@ -117,7 +117,7 @@ def card(window: Any, *, box: tuple[float, float, float, float]) -> Any:
     )
 
 
-class Picture:
+class CachedPicture:
     """What seldom changes, drawn once and then copied to each frame as a picture of it."""
 
     def __init__(self, window: Any, draw: Callable[[], None]) -> None:

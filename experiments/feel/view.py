@@ -74,7 +74,7 @@ class Now(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Yardstick:
+class FeltCriterion:
     """The criterion for whether a layer is felt, as in `modeling.simplify`."""
 
     threshold: Threshold
@@ -112,7 +112,7 @@ class Yardstick:
         return amplitude, np.where(unknown, np.nan, level)
 
 
-def texture_now(texture: Texture, hand: HandNow, yardstick: Yardstick) -> Now:
+def texture_now(texture: Texture, hand: HandNow, yardstick: FeltCriterion) -> Now:
     """Both models of a texture under the hand as it is now."""
     simplified = texture.simplified
     return Now(
@@ -122,7 +122,7 @@ def texture_now(texture: Texture, hand: HandNow, yardstick: Yardstick) -> Now:
     )
 
 
-def model_now(model: Layered, hand: HandNow, yardstick: Yardstick) -> ModelNow:
+def model_now(model: Layered, hand: HandNow, yardstick: FeltCriterion) -> ModelNow:
     """A model's spectrum, layers and level under the hand as it is now.
 
     A hand that is not there counts as lifted off, as it does for the rig.
@@ -179,7 +179,7 @@ def _conditions(model: Layered) -> Iterator[PEQ]:
     return (model.peq(float(v), float(f)) for v in model.speeds_mm_s for f in model.forces_n)
 
 
-def amplitude_range(yardstick: Yardstick, textures: Sequence[Texture]) -> tuple[float, float]:
+def amplitude_range(yardstick: FeltCriterion, textures: Sequence[Texture]) -> tuple[float, float]:
     """Lowest and highest amplitude (g peak) on the axis of layers, the same for all textures."""
     threshold = yardstick.threshold
     highest = float(threshold.acceleration_g.max())

@@ -15,14 +15,14 @@ from experiments.console.events import Mouse
 from experiments.console.page import Page
 from experiments.console.screens import open_window
 from experiments.console.widgets import Button
-from experiments.feel.panels import HandPanel, LayerPanel, Layout, SpectrumPanel, layout_for
-from experiments.feel.plots import TICK_HEIGHT, LiveText, Picture, card
+from experiments.feel.panels import HandPanel, LayerPanel, Layout, SpectrumPlot, layout_for
+from experiments.feel.plots import TICK_HEIGHT, CachedPicture, LiveText, card
 from experiments.feel.view import (
     HIGHEST_SHARE,
     PLACES,
+    FeltCriterion,
     ModelNow,
     Now,
-    Yardstick,
     amplitude_range,
     hand_words,
     output_words,
@@ -47,7 +47,7 @@ KEYS = (
 FrameHook = Callable[["FeelWindow"], None]
 
 
-class Pointer:
+class PointerPosition:
     """Where the pointer is on a window, in pixels from the bottom left."""
 
     def __init__(self, window: Any) -> None:
@@ -73,7 +73,7 @@ class FeelWindow:
     Parameters
     ----------
     visit : Visit
-    yardstick : Yardstick
+    yardstick : FeltCriterion
         By which a layer counts as felt.
     size : (int, int)
         Window in pixels, at least 4:3.
@@ -87,7 +87,7 @@ class FeelWindow:
     def __init__(
         self,
         visit: Visit,
-        yardstick: Yardstick,
+        yardstick: FeltCriterion,
         *,
         size: tuple[int, int] = (1280, 800),
         fullscreen: bool = False,
@@ -97,7 +97,7 @@ class FeelWindow:
         self._visit, self._yardstick = visit, yardstick
         self.window = open_window(size=size, fullscreen=fullscreen, screen=screen)
         self._mouse = Mouse(self.window)
-        self._pointer = Pointer(self.window)
+        self._pointer = PointerPosition(self.window)
         self._on_frame = on_frame
         self._fault = ""
         self._ended = False
@@ -173,7 +173,7 @@ class FeelWindow:
     def _build(self, layout: Layout) -> None:
         textures = self._visit.textures
         highest = HIGHEST_SHARE * max(texture.full.rate_hz for texture in textures) / 2
-        self._spectrum = SpectrumPanel(
+        self._spectrum = SpectrumPlot(
             self.window, layout.spectrum, highest_hz=highest, density=spectrum_range(textures)
         )
         self._layers = LayerPanel(
@@ -209,7 +209,7 @@ class FeelWindow:
         self._status = [
             LiveText(self.window, at=(x, top - 0.027 - 0.031 * row)) for row in range(4)
         ]
-        self._ground = Picture(self.window, self._draw_ground)
+        self._ground = CachedPicture(self.window, self._draw_ground)
         self._page = Page(
             "feel",
             widgets=[*self._texture_buttons(layout), *self._mode_buttons(layout)],

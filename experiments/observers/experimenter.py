@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from experiments.sessions.surfaces import Standing
+from experiments.sessions.surfaces import ProgressReport
 
 
 class SimulatedExperimenter:
@@ -35,7 +35,7 @@ class SimulatedExperimenter:
         """Always."""
         return True
 
-    def tell(self, standing: Standing) -> None:
+    def tell(self, standing: ProgressReport) -> None:
         """Needs no information."""
 
     def page(self, name: str) -> None:

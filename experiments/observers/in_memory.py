@@ -51,7 +51,7 @@ class _UnfeltRig(SimulatedRig):
         return ()
 
 
-class _Answers(MemoryStore):
+class _KeptAnswers(MemoryStore):
     """Keeps only answers."""
 
     def log(self, event: str, **fields: object) -> None:
@@ -160,7 +160,7 @@ def _rows_of(
             subject=subject,
             occasion=occasion_of(task, session),
         )
-        store = _Answers()
+        store = _KeptAnswers()
         run_trials(
             draw_session(study, kind, subject=subject, session=session, slot=slot),
             kind,

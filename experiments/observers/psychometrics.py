@@ -47,7 +47,7 @@ class Trait:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Person:
+class SimulatedPerson:
     """One participant, drawn from `Psychometrics`; its traits are described there.
 
     Parameters
@@ -203,7 +203,7 @@ class Psychometrics:
             check_number(f"{what} in {where}", points, low=-most, high=most)
         return dict(effects)
 
-    def draw(self, rng: np.random.Generator) -> Person:
+    def draw(self, rng: np.random.Generator) -> SimulatedPerson:
         """One participant.
 
         Parameters
@@ -218,7 +218,7 @@ class Psychometrics:
             trait = getattr(self, name)
             traits[name] = trait.mean + trait.sd * z
         liked = tuple(self.preference_sd * z for z in own[len(_LIMITS) :])
-        return Person(**traits, preferences=liked, **self._beside(rng))
+        return SimulatedPerson(**traits, preferences=liked, **self._beside(rng))
 
     def _beside(self, rng: np.random.Generator) -> dict[str, Any]:
         """Carelessness and deviations; what else `rng` is asked for does not depend on them."""
@@ -248,7 +248,7 @@ class Psychometrics:
         left = max(self.best_rating - abs(points), LOWEST_FELT) / self.best_rating
         return -self.scale_db * log(left)
 
-    def unpractised(self, person: Person, trial: int) -> float:
+    def unpractised(self, person: SimulatedPerson, trial: int) -> float:
         """How many times as large noise is in a trial (from 1) as after much practice."""
         return 1.0 + person.learning * exp(-(trial - 1) / self.learning_trials)
 

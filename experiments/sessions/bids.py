@@ -17,7 +17,7 @@ from experiments.sessions.data_set import DESCRIPTION_NAME, describe_data_set
 from experiments.sessions.files import SessionFiles
 from experiments.sessions.held import (
     Damaged,
-    Held,
+    StoredSession,
     held_session,
     held_sessions,
     participants_of,
@@ -173,13 +173,13 @@ def require_tables(
         )
 
 
-def _to_be_shown(held: Held) -> bool:
+def _to_be_shown(held: StoredSession) -> bool:
     """Whether a session has ended, and had begun."""
     return bool(held.state.events) and not held.running
 
 
 def _people(
-    root: Path, held: list[Held], *, damaged: list[Damaged], kept: Collection[str] = ()
+    root: Path, held: list[StoredSession], *, damaged: list[Damaged], kept: Collection[str] = ()
 ) -> Made:
     """The tables about people of all sessions that are shown; `kept` are people left alone.
 
@@ -206,7 +206,7 @@ def _people(
     return made
 
 
-def _without_source(root: Path, sessions: Iterable[Held | Damaged]) -> set[str]:
+def _without_source(root: Path, sessions: Iterable[StoredSession | Damaged]) -> set[str]:
     """People with a table of answers from which nothing is there that it was made from."""
     read = {one.files.answers for one in sessions}
     return {path.parts[-4] for path in _answer_tables(root) if path not in read}

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.sessions.bids_tables import json_bytes, table_bytes
-from experiments.sessions.held import Held
+from experiments.sessions.held import StoredSession
 from modeling.files.answer_tables import ANSWER_TABLES, PARTICIPANT_COLUMNS, PARTICIPANT_ID
 from modeling.files.columns import Column, sidecar
 
@@ -46,7 +46,7 @@ SESSION_COLUMNS = (
 
 def people_files(
     root: Path,
-    sessions: Sequence[Held],
+    sessions: Sequence[StoredSession],
     roster: Mapping[int, Mapping[str, Any]],
     *,
     rows_kept: Collection[str] = (),
@@ -58,7 +58,7 @@ def people_files(
     ----------
     root : Path
         Of the data set.
-    sessions : sequence of Held
+    sessions : sequence of StoredSession
         By subject, session and task.
     roster : mapping of subject to mapping
         As `Roster.subjects` gives it.
@@ -67,7 +67,7 @@ def people_files(
     kept : collection of str
         Participants whose sessions.tsv is left alone for that reason.
     """
-    by_person: dict[str, list[Held]] = {}
+    by_person: dict[str, list[StoredSession]] = {}
     for held in sessions:
         by_person.setdefault(held.files.participant, []).append(held)
     columns = (PARTICIPANT_ID, *_questions(sessions), *PARTICIPANT_COLUMNS)
@@ -99,7 +99,7 @@ def _rows_there(table: Path) -> tuple[bytes, dict[str, bytes]]:
     return header, {row.split(b"\t", 1)[0].decode("utf-8", "replace"): row for row in rows}
 
 
-def _questions(sessions: Iterable[Held]) -> Iterable[Column]:
+def _questions(sessions: Iterable[StoredSession]) -> Iterable[Column]:
     """The columns of what was asked, in the order of the study."""
     columns: dict[str, Column] = {}
     for held in sessions:
@@ -117,7 +117,7 @@ def _questions(sessions: Iterable[Held]) -> Iterable[Column]:
 
 
 def _person(
-    name: str, sessions: Sequence[Held], roster: Mapping[int, Mapping[str, Any]]
+    name: str, sessions: Sequence[StoredSession], roster: Mapping[int, Mapping[str, Any]]
 ) -> dict[str, object]:
     first = sessions[0].manifest
     answers: dict[str, object] = {}
@@ -140,7 +140,7 @@ def _person(
     }
 
 
-def _session_rows(sessions: Sequence[Held]) -> list[dict[str, object]]:
+def _session_rows(sessions: Sequence[StoredSession]) -> list[dict[str, object]]:
     days = {s.files.session_id: datetime.fromisoformat(s.state.begun_utc).date() for s in sessions}
     first = min(days.values())
     rows: dict[str, dict[str, object]] = {}

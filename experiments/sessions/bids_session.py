@@ -14,7 +14,7 @@ from typing import Any
 from experiments.sessions import bids_events
 from experiments.sessions.bids_tables import json_bytes, table_bytes
 from experiments.sessions.files import SessionFiles
-from experiments.sessions.held import Held
+from experiments.sessions.held import StoredSession
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.trace_rows import TraceRows, hand_rows, presentation_rows
 from experiments.sessions.traces import HAND_COLUMNS
@@ -28,7 +28,7 @@ from modeling.files.hashes import sha256_of_paths
 Made = dict[Path, bytes]
 
 
-def session_files(held: Held) -> tuple[Made, tuple[str, ...]]:
+def session_files(held: StoredSession) -> tuple[Made, tuple[str, ...]]:
     """All files of a session, and which rows of its traces are damaged and not in them.
 
     The last file is the sidecar that says that the others are there, and what is not in them. The
@@ -56,17 +56,17 @@ def session_files(held: Held) -> tuple[Made, tuple[str, ...]]:
     return made, (*lost_rows, *lost_readings)
 
 
-def _answers(held: Held) -> Made:
+def _answers(held: StoredSession) -> Made:
     return {held.files.answers: table_bytes(_columns(held), held.state.rows)}
 
 
-def _columns(held: Held) -> list[AnswerColumn]:
+def _columns(held: StoredSession) -> list[AnswerColumn]:
     """The columns of the answers, without optional ones that no answer has."""
     columns = ANSWER_TABLES[held.manifest.task].columns
     return [c for c in columns if not c.optional or any(c.name in row for row in held.state.rows)]
 
 
-def _events(held: Held, presentations: list[dict[str, str]]) -> Made:
+def _events(held: StoredSession, presentations: list[dict[str, str]]) -> Made:
     rows = bids_events.event_rows(held.state.events, presentations)
     table = held.files.beh / f"{held.files.stem}_events.tsv"
     described = sidecar_of(bids_events.COLUMNS)
@@ -88,7 +88,7 @@ def _events(held: Held, presentations: list[dict[str, str]]) -> Made:
     }
 
 
-def _hand(held: Held, runs: set[int]) -> tuple[Made, tuple[str, ...]]:
+def _hand(held: StoredSession, runs: set[int]) -> tuple[Made, tuple[str, ...]]:
     """A file for each start of the session, whose rig has a clock of its own."""
     path = held.files.named("hand.tsv")
     found = hand_rows(path, runs=runs)
@@ -145,7 +145,7 @@ def _hand_there(sidecar: Path, sources: Mapping[str, str]) -> tuple[Made, tuple[
     return made, tuple(damaged)
 
 
-def _circumstances(held: Held) -> dict[str, Any]:
+def _circumstances(held: StoredSession) -> dict[str, Any]:
     """What was the same in all trials."""
     manifest = held.manifest
     study = manifest.study

@@ -23,7 +23,7 @@ from modeling.files.reading import read_bytes
 
 
 @dataclass(frozen=True, kw_only=True)
-class Held:
+class StoredSession:
     """One session that there is: its files, its manifest, and how it stands."""
 
     files: SessionFiles
@@ -44,7 +44,7 @@ class Damaged:
     told: str
 
 
-def held_session(files: SessionFiles) -> Held:
+def held_session(files: SessionFiles) -> StoredSession:
     """Read one session.
 
     Raises
@@ -61,10 +61,10 @@ def held_session(files: SessionFiles) -> Held:
     stored = read_bytes(files.manifest, "the manifest of a session")
     check_named(state.events, files, sha256=hashlib.sha256(stored).hexdigest())
     _check_rows(state.events, files)
-    return Held(files=files, manifest=manifest, state=state)
+    return StoredSession(files=files, manifest=manifest, state=state)
 
 
-def held_sessions(data_folder: str | Path) -> tuple[list[Held], list[Damaged]]:
+def held_sessions(data_folder: str | Path) -> tuple[list[StoredSession], list[Damaged]]:
     """All sessions of a data set that have a manifest, by subject, session and task."""
     held, damaged = [], []
     for files in sessions_in(data_folder):
@@ -75,7 +75,7 @@ def held_sessions(data_folder: str | Path) -> tuple[list[Held], list[Damaged]]:
     return held, damaged
 
 
-def participants_of(sessions: Iterable[Held | Damaged]) -> frozenset[str]:
+def participants_of(sessions: Iterable[StoredSession | Damaged]) -> frozenset[str]:
     """Whose sessions these are, as sub-01."""
     return frozenset(one.files.participant for one in sessions)
 

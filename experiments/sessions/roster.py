@@ -47,7 +47,7 @@ class Listed:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Person:
+class RosterEntry:
     """Somebody who takes part.
 
     Parameters
@@ -89,7 +89,7 @@ class Roster:
         *,
         simulated: bool = False,
         pilot: bool = False,
-    ) -> Iterator[Person]:
+    ) -> Iterator[RosterEntry]:
         """The participant with this number, enrolled now if never before.
 
         Who is new is not enrolled after all where the block raises; meanwhile no one else can be.
@@ -104,7 +104,7 @@ class Roster:
 
         Yields
         ------
-        Person
+        RosterEntry
             With the slot of its own number if that is free, else with the lowest one that somebody
             left who withdrew or dropped out.
 
@@ -131,7 +131,7 @@ class Roster:
             before = self.path.stat().st_size if self.path.exists() else 0
             self._append("enrolled", subject=number, slot=slot, code=code, **kind)
             try:
-                yield Person(subject=number, slot=slot, code=code, known=False)
+                yield RosterEntry(subject=number, slot=slot, code=code, known=False)
             except BaseException:
                 os.truncate(self.path, before)
                 raise
@@ -218,7 +218,9 @@ class Roster:
         except OSError as error:
             raise store_error(error, self.path, _ADVICE) from error
 
-    def _known(self, entry: Mapping[str, Any], participants: int, *, simulated: bool) -> Person:
+    def _known(
+        self, entry: Mapping[str, Any], participants: int, *, simulated: bool
+    ) -> RosterEntry:
         number, slot = entry["subject"], entry["slot"]
         if entry["left"]:
             raise InputError(
@@ -236,7 +238,7 @@ class Roster:
                 f"expected one of the {participants} slots of the task, got subject {number} with "
                 f"slot {slot}; choose a subject with a lower slot, or plan more participants."
             )
-        return Person(subject=number, slot=slot, code=entry["code"], known=True)
+        return RosterEntry(subject=number, slot=slot, code=entry["code"], known=True)
 
     def _require_whole(self, listed: Listed) -> None:
         if listed.damaged:

@@ -15,7 +15,7 @@ from experiments.sessions.order import draw_session
 from experiments.sessions.overrides import Overrides
 from experiments.sessions.program import program_facts
 from experiments.sessions.resume import resumption
-from experiments.sessions.roster import Person, Roster
+from experiments.sessions.roster import Roster, RosterEntry
 from experiments.sessions.store import SessionStore
 from experiments.sessions.surfaces import Intake
 from experiments.sessions.task import Task
@@ -197,7 +197,7 @@ def _require_language(study: Study, language: str) -> None:
         )
 
 
-def _intake(study: Study, root: Path, person: Person) -> Intake:
+def _intake(study: Study, root: Path, person: RosterEntry) -> Intake:
     """What to ask first; of who gave this consent before, only whether the code is theirs."""
     logs = (root / "sourcedata" / f"sub-{person.subject:02d}").glob("ses-*/*_log.jsonl")
     return Intake(

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from experiments.sessions.files import require_data_folder
-from experiments.sessions.held import Damaged, Held, held_sessions
+from experiments.sessions.held import Damaged, StoredSession, held_sessions
 from experiments.sessions.roster import Roster
 from experiments.sessions.state import Status
 from experiments.study.study import Study
@@ -125,7 +125,7 @@ def study_progress(
         if isinstance(design.get(task), Mapping)
     }
     roster = Roster(root).listed()
-    sessions: list[Held | Damaged] = [*held, *damaged]
+    sessions: list[StoredSession | Damaged] = [*held, *damaged]
     people = tuple(
         _person(entry, [s for s in sessions if s.files.subject == number], wanted, today=today)
         for number, entry in roster.entries.items()
@@ -144,7 +144,7 @@ def _sessions(plan: Mapping[str, Any]) -> int:
 
 def _person(
     entry: Mapping[str, Any],
-    sessions: Sequence[Held | Damaged],
+    sessions: Sequence[StoredSession | Damaged],
     wanted: Mapping[str, tuple[int, int]],
     *,
     today: date | None,
@@ -163,12 +163,12 @@ def _person(
     begun = {
         (one.files.task, one.files.session): one.state.last_utc
         for one in found
-        if isinstance(one, Held)
+        if isinstance(one, StoredSession)
     }
     return person if person.left else replace(person, due=_due(person, begun, wanted, today=today))
 
 
-def _session(one: Held | Damaged) -> SessionProgress:
+def _session(one: StoredSession | Damaged) -> SessionProgress:
     task, session = one.files.task, one.files.session
     if isinstance(one, Damaged):
         return SessionProgress(task=task, session=session, status="damaged", answered=0, planned=0)

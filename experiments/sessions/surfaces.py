@@ -364,7 +364,7 @@ class Respondent(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Standing:
+class ProgressReport:
     """The progress of a session, as an experimenter sees it.
 
     Parameters
@@ -404,7 +404,7 @@ class Experimenter(Protocol):
         """Whether what was asked last has been confirmed; SessionAborted where it is to end."""
         ...
 
-    def tell(self, standing: Standing) -> None:
+    def tell(self, standing: ProgressReport) -> None:
         """Show the progress of the session and the state of the rig."""
         ...
 

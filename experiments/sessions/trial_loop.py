@@ -19,9 +19,9 @@ from experiments.sessions.strokes import advice_on, outside_grid
 from experiments.sessions.surfaces import (
     Experimenter,
     Intake,
+    ProgressReport,
     Respondent,
     SessionAborted,
-    Standing,
     Surfaces,
 )
 from experiments.sessions.task import Task
@@ -322,11 +322,11 @@ class _Running:
         self._respondent.wait(self._experimenter.ready)
         self.note("mount_confirmed", tray=trial.tray)
 
-    def _standing(self, trial: Trial) -> Standing:
+    def _standing(self, trial: Trial) -> ProgressReport:
         left = None
         if self._durations_s:
             left = median(self._durations_s) * (self._mains - self._mains_done) / 60.0
-        return Standing(
+        return ProgressReport(
             phase=trial.phase,
             done=self._mains_done,
             of=self._mains,

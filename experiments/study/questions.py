@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar
 
 from modeling import InputError
 from modeling.errors import shown
-from modeling.files.described import Section, key
+from modeling.files.described import FileSection, key
 from modeling.files.kinds import Label, is_different, is_line
 
 # Those whose wording the language files of the console hold.
@@ -25,7 +25,7 @@ def _is_free(name: str) -> bool:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Question(Section):
+class Question(FileSection):
     """A question that each participant is asked once: for a number, or for one of several levels.
 
     Raises

@@ -23,7 +23,7 @@ from modeling.checks import check_keys
 from modeling.errors import shown
 from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.claims import ClaimSection, PlanSection
-from modeling.files.described import DescribedFile, Section, key
+from modeling.files.described import DescribedFile, FileSection, key
 from modeling.files.hashes import sha256_of_values
 from modeling.files.kinds import Label, ListedLabel, is_different, is_label, is_line
 
@@ -50,7 +50,7 @@ def _are_trays(trays: Mapping[str, str]) -> bool:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Consent(Section):
+class Consent(FileSection):
     """The page of consent, which is shown first."""
 
     WHERE: ClassVar[str] = "[consent]"

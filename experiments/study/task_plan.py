@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from modeling import InputError
 from modeling.errors import shown
 from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.described import Section, key
+from modeling.files.described import FileSection, key
 from modeling.files.kinds import Label, is_different
 
 # The usual repeats of a task whose table does not say; 1 in any other.
@@ -25,7 +25,7 @@ def _can_be_compared(names: tuple[str, ...]) -> bool:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TaskPlan(Section):
+class TaskPlan(FileSection):
     """How many people do a task, how often, and on which days: a table of the task's name.
 
     docs/method/protocols.md#schedule

@@ -49,7 +49,7 @@ BEYOND = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Answered:
+class ThresholdAnswers:
     """What some people answered.
 
     Parameters
@@ -99,7 +99,7 @@ class MeanThreshold:
 # --- Read -----------------------------------------------------------------------------------
 
 
-def read_answers(data_folder: str | Path, *, subject: int | None = None) -> Answered:
+def read_answers(data_folder: str | Path, *, subject: int | None = None) -> ThresholdAnswers:
     """The answers of one participant, or of all, with the thresholds that follow from them.
 
     Parameters
@@ -135,7 +135,7 @@ def read_answers(data_folder: str | Path, *, subject: int | None = None) -> Answ
             f"expected answers{whose} to main trials of the threshold task in {folder}, got none; "
             "run tactileq session --task threshold first (pilots do not count)."
         )
-    return Answered(files=files, estimates=estimates, simulated=simulated == {"true"})
+    return ThresholdAnswers(files=files, estimates=estimates, simulated=simulated == {"true"})
 
 
 def answer_files(data_folder: str | Path, *, subject: int | None = None) -> tuple[Path, ...]:

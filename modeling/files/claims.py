@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from modeling.errors import InputError, shown
 from modeling.files.answer_tables import ANSWER_TABLES, ENDS
-from modeling.files.described import Section, key
+from modeling.files.described import FileSection, key
 from modeling.files.hashes import sha256_of_values
 from modeling.files.kinds import Label, is_different
 
@@ -24,7 +24,7 @@ LARGEST = {**dict.fromkeys(RATINGS, ENDS[1] - ENDS[0]), "correct": 1.0}
 
 
 @dataclass(frozen=True, kw_only=True)
-class ClaimSection(Section):
+class ClaimSection(FileSection):
     """One claim about two sets of models, with the bounds that would contradict it."""
 
     WHERE: ClassVar[str] = "[[plan.claims]]"
@@ -77,7 +77,7 @@ class ClaimSection(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlanSection(Section):
+class PlanSection(FileSection):
     """Claims and exclusions, fixed before the first answer."""
 
     WHERE: ClassVar[str] = "[plan]"

@@ -1,10 +1,10 @@
 """Files that are declared once: what each key of a section may hold, its unit, range and default.
 
-A section is a frozen dataclass that inherits from `Section`. Its fields are its keys: a type, and
-by `key` what it means, its unit and its limits::
+A section is a frozen dataclass that inherits from `FileSection`. Its fields are its keys: a type,
+and by `key` what it means, its unit and its limits::
 
     @dataclass(frozen=True, kw_only=True)
-    class HandRange(Section):
+    class HandRange(FileSection):
         WHERE = "[hand]"
         stroke_hz: Annotated[float, key("strokes back and forth", unit="Hz", ge=0, le=20)] = 2.0
 
@@ -135,7 +135,7 @@ class Key:
     annotation: Any
     kind: inspect.Type
     default: Any
-    section: type[Section] | None
+    section: type[FileSection] | None
     several: bool
     keys: tuple[Key, ...] = ()
     description: str = ""
@@ -286,7 +286,7 @@ class Key:
         )
 
 
-class Section:
+class FileSection:
     """The base of a section's dataclass: its fields are checked when it is made."""
 
     WHERE: ClassVar[str] = ""  # how messages call it: "[hand]", "[[model]]"
@@ -344,7 +344,7 @@ class Section:
         return values
 
 
-class DescribedFile(Section):
+class DescribedFile(FileSection):
     """The base of a whole TOML file: its values stand under `WHERE`, its sections in tables.
 
     Subclasses declare `WHAT` ("a scene"), and `VERSION` and `WHERE` unless the file states no
@@ -401,7 +401,7 @@ def naming(file: Path) -> Iterator[None]:
 
 def plain(value: Any) -> Any:
     """A value of a section as JSON and TOML hold it."""
-    if isinstance(value, Section):
+    if isinstance(value, FileSection):
         return value.to_dict()
     if isinstance(value, tuple):
         return [plain(one) for one in value]
@@ -414,7 +414,7 @@ def plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
-def keys_of(section: type[Section]) -> tuple[Key, ...]:
+def keys_of(section: type[FileSection]) -> tuple[Key, ...]:
     """The keys of a section, in the order of its fields."""
     return _keys_of(section)  # type: ignore[arg-type] # a class can be hashed
 
@@ -448,7 +448,7 @@ def _held(
     folder: Path | None,
     advice: str = "",
 ) -> dict[str, Any]:
-    """The fields of a section from its table; refused as by `Section.read`."""
+    """The fields of a section from its table; refused as by `FileSection.read`."""
     check_keys(values, [name for one in keys for name in one.names], where=where or "the file")
     for one in keys:
         if one.required and one.name not in values:
@@ -461,7 +461,7 @@ def _held(
 _NATIVE = (datetime.date, datetime.datetime)
 
 
-def _key(name: str, annotation: Any, *, default: Any, holder: type[Section]) -> Key:
+def _key(name: str, annotation: Any, *, default: Any, holder: type[FileSection]) -> Key:
     always = bool(holder.ADVICE) and name not in holder.OPTIONAL
     advice = {"advice": holder.ADVICE} if holder.ADVICE else {}
     section, several = _section_of(annotation)
@@ -531,7 +531,7 @@ def _metas(annotation: Any) -> Iterator[Meta]:
     yield from getattr(annotation, "__metadata__", ())
 
 
-def _section_of(annotation: Any) -> tuple[type[Section] | None, bool]:
+def _section_of(annotation: Any) -> tuple[type[FileSection] | None, bool]:
     """The class of the sections that a key holds, and whether it is a list of them."""
     if hasattr(annotation, "__metadata__"):
         annotation = annotation.__origin__
@@ -542,12 +542,14 @@ def _section_of(annotation: Any) -> tuple[type[Section] | None, bool]:
     if get_origin(annotation) is tuple:
         item, _ = _section_of(get_args(annotation)[0])
         return item, item is not None
-    if isinstance(annotation, type) and issubclass(annotation, Section):
+    if isinstance(annotation, type) and issubclass(annotation, FileSection):
         return annotation, False
     return None, False
 
 
-def _section(kind: type[Section], value: Any, folder: Path | None, *, where: str = "") -> Section:
+def _section(
+    kind: type[FileSection], value: Any, folder: Path | None, *, where: str = ""
+) -> FileSection:
     return value if isinstance(value, kind) else kind.read(value, where=where, folder=folder)
 
 
@@ -569,7 +571,7 @@ def _path_in(folder: Path | None) -> Callable[[type, Any], Any]:
     return path
 
 
-def no_table(section: type[Section], value: object, *, where: str = "") -> InputError:
+def no_table(section: type[FileSection], value: object, *, where: str = "") -> InputError:
     where = where or section.WHERE
     advice = section.ADVICE or f"write {where} above its keys"
     return InputError(f"expected a table {where}, got {shown(value)}; {advice}.")

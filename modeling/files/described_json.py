@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any, ClassVar, Self
 
 from modeling.errors import InputError, shown
-from modeling.files.described import Section, naming, no_table
+from modeling.files.described import FileSection, naming, no_table
 from modeling.files.documents import dump_json, read_json_object
 from modeling.files.hashes import sha256_of
 from modeling.files.writing import write_text
 
 
-class DescribedJson(Section):
+class DescribedJson(FileSection):
     """The base of a whole JSON file that programs write, with `format` and `version` at its top.
 
     Subclasses declare `WHAT` ("a model file"), `FORMAT`, `VERSION` where it is not 1, and `ADVICE`.

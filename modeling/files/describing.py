@@ -7,13 +7,13 @@ from typing import Any
 
 import msgspec
 
-from modeling.files.described import NOT_FINITE, DescribedFile, Key, Section, keys_of, plain
+from modeling.files.described import NOT_FINITE, DescribedFile, FileSection, Key, keys_of, plain
 from modeling.files.described_json import DescribedJson
 
 BAR = r"\|"  # in a cell of Markdown
 
 
-def schema(file: type[Section]) -> dict[str, Any]:
+def schema(file: type[FileSection]) -> dict[str, Any]:
     """The JSON Schema (2020-12) of a file, for editors that complete and check what one types."""
     properties, required = _properties(keys_of(file))
     if issubclass(file, DescribedFile):
@@ -31,12 +31,12 @@ def schema(file: type[Section]) -> dict[str, Any]:
     return {**about, **_object(file, properties, required)}
 
 
-def schema_text(file: type[Section]) -> str:
+def schema_text(file: type[FileSection]) -> str:
     """The text of the schema's file."""
     return json.dumps(schema(file), indent=2, ensure_ascii=False) + "\n"
 
 
-def key_tables(file: type[Section]) -> str:
+def key_tables(file: type[FileSection]) -> str:
     """The keys of a file in Markdown, a table for each of its sections."""
     keys = keys_of(file)
     parts = [] if all(one.is_table for one in keys) else [_key_table(file)]
@@ -48,7 +48,7 @@ def key_tables(file: type[Section]) -> str:
     return "\n\n".join(parts)
 
 
-def _key_table(section: type[Section]) -> str:
+def _key_table(section: type[FileSection]) -> str:
     lines = [
         f"### `{section.WHERE}`" if section.WHERE else "### At the top",
         "",
@@ -71,7 +71,7 @@ def _holds(one: Key) -> str:
     return str(getattr(one.section, "WHAT", below))
 
 
-def _summary(section: type[Section]) -> str:
+def _summary(section: type[FileSection]) -> str:
     """The first paragraph of its docstring."""
     return " ".join((section.__doc__ or "").split("\n\n")[0].split())
 
@@ -91,7 +91,7 @@ def _properties(keys: tuple[Key, ...]) -> tuple[dict[str, Any], list[str]]:
 
 
 def _object(
-    section: type[Section], properties: dict[str, Any], required: list[str]
+    section: type[FileSection], properties: dict[str, Any], required: list[str]
 ) -> dict[str, Any]:
     if issubclass(section, DescribedJson):
         head = {"format": {"const": section.FORMAT}, "version": {"const": section.VERSION}}

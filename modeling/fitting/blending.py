@@ -26,7 +26,7 @@ HELD = 20.0
 AROUND = np.array([-1.5, -0.75, 0.0, 0.75, 1.5])
 
 
-class Held(NamedTuple):
+class BlendPenalty(NamedTuple):
     """What blends that are off cost, and its derivatives by the parameters of the nodes (N, p)."""
 
     cost: float
@@ -94,7 +94,7 @@ class Middles:
         square = fixed @ share + along * (middles.passed @ share)
         return np.asarray(NEPER_DB * np.sqrt(square))
 
-    def held(self, theta: Floats, signs: Floats) -> Held:
+    def held(self, theta: Floats, signs: Floats) -> BlendPenalty:
         """The cost of what is off in the middles, from the parameters (N, p) of the nodes."""
         seen = self._seen(theta, signs)
         m, off = len(self.corners), seen.off
@@ -109,7 +109,7 @@ class Middles:
                 steps=STEP_OF_CORNERS,
                 held=HELD,
             )
-            return Held(cost, Blocks(*blocks), score)
+            return BlendPenalty(cost, Blocks(*blocks), score)
         slope = 0.5 * seen.by_parameter
         far = np.flatnonzero(off.any(axis=1))
         p = theta.shape[1]
@@ -126,7 +126,7 @@ class Middles:
         along = -HELD * np.einsum("mapn,mn->map", pull, off[far])
         np.add.at(score, self.corners[far], along)
         information = of_cells(self.corners[far], blocks, self.count)
-        return Held(cost, information, score)
+        return BlendPenalty(cost, information, score)
 
     def _seen(self, theta: Floats, signs: Floats) -> _Seen:
         """What the middles are held to, and how far off they are.

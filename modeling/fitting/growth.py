@@ -28,7 +28,7 @@ CANDIDATES = 3
 RAISED = (1.3, 1e4)  # power ratio at which a new layer starts
 
 
-class Candidate(NamedTuple):
+class MissingLayer(NamedTuple):
     """A layer that might be missing: frequencies, widths (Hz) and power ratio in each record."""
 
     frequencies_hz: Floats
@@ -37,7 +37,7 @@ class Candidate(NamedTuple):
     evidence: float
 
 
-def candidates(grid: TextureGrid, theta: Floats, signs: Floats | None) -> list[Candidate]:
+def candidates(grid: TextureGrid, theta: Floats, signs: Floats | None) -> list[MissingLayer]:
     """Laws along which most power is missing, by falling evidence.
 
     Parameters
@@ -82,8 +82,8 @@ def _along(gain: Floats, shifts: Integers, reach: int) -> Floats:
 
 def _distinct(
     found: list[tuple[float, int, Integers, Floats]], *, rate_hz: float
-) -> list[Candidate]:
-    chosen: list[Candidate] = []
+) -> list[MissingLayer]:
+    chosen: list[MissingLayer] = []
     taken: list[tuple[Integers, int]] = []
     for evidence, width, place, raised in sorted(found, key=lambda f: -f[0]):
         if any(np.median(np.abs(place - p)) < 0.75 * max(width, w) for p, w in taken):
@@ -95,7 +95,7 @@ def _distinct(
         height = np.where(place == inside, raised[np.arange(len(place)), inside], 1.0)
         # A Lorentzian of width B is detected best by a box of about 1.4 B.
         bandwidth = 0.7 * width * CELL * frequency
-        chosen.append(Candidate(frequency, bandwidth, np.clip(height, *RAISED), evidence))
+        chosen.append(MissingLayer(frequency, bandwidth, np.clip(height, *RAISED), evidence))
         if len(chosen) == CANDIDATES:
             break
     return chosen
@@ -142,7 +142,7 @@ def _boxes(ratio: Floats, lines: Floats, width: int) -> tuple[Floats, Floats]:
     return gain, raised
 
 
-def inserted_independently(theta: Floats, candidate: Candidate, *, rate_hz: float) -> Floats:
+def inserted_independently(theta: Floats, candidate: MissingLayer, *, rate_hz: float) -> Floats:
     """Parameters (K, p + 3) of independent layers with the candidate as the last one."""
     m = (theta.shape[1] - 1) // 3
     noise, frequency, bandwidth, gain = split(theta, m)
@@ -152,7 +152,7 @@ def inserted_independently(theta: Floats, candidate: Candidate, *, rate_hz: floa
     return _appended(theta, candidate, amplitude)
 
 
-def _appended(theta: Floats, candidate: Candidate, log_amplitude: Floats) -> Floats:
+def _appended(theta: Floats, candidate: MissingLayer, log_amplitude: Floats) -> Floats:
     m = (theta.shape[1] - 1) // 3
     noise, frequency, bandwidth, gain = split(theta, m)
     columns = (
@@ -174,7 +174,7 @@ def _offsets_at(frequency: Floats, bandwidth: Floats, at_hz: Floats, *, rate_hz:
 
 
 def inserted(
-    theta: Floats, signs: Floats, candidate: Candidate, *, sign: float, rate_hz: float
+    theta: Floats, signs: Floats, candidate: MissingLayer, *, sign: float, rate_hz: float
 ) -> tuple[Floats, Floats]:
     """Parameters (K, p + 3) and signs (m + 1,) with the candidate as the last layer.
 

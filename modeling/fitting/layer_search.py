@@ -168,7 +168,7 @@ def search(grid: TextureGrid, *, count: int | None = None) -> list[Solution]:
         The only number of layers to be considered.
     """
     part = grid.coarse()
-    pool = _Pool(part, count)
+    pool = _SolutionPool(part, count)
     _grow(pool)
     _reduce(pool)
     if pool.best().count <= MOST_SPREAD_LAYERS:
@@ -180,7 +180,7 @@ def search(grid: TextureGrid, *, count: int | None = None) -> list[Solution]:
     return [expanded(grid, part, s) for s in pool.contenders()]
 
 
-class _Pool:
+class _SolutionPool:
     """Solutions on the coarse grid, by number of layers."""
 
     def __init__(self, grid: TextureGrid, count: int | None) -> None:
@@ -226,7 +226,7 @@ class _Pool:
         return [s for solutions in self._solutions.values() for s in solutions]
 
 
-def _grow(pool: _Pool) -> None:
+def _grow(pool: _SolutionPool) -> None:
     """Independent layers, one by one, along laws over the grid; each number of them with signs.
 
     Where coherent layers cancel or add up, independent ones go on growing indefinitely; it ends
@@ -270,7 +270,7 @@ def _with_signs(grid: TextureGrid, theta: Floats) -> list[Solution]:
     return [fitted(grid, *start) for start in _likeliest(grid, starts, TRIED_SIGNS)]
 
 
-def _reduce(pool: _Pool) -> None:
+def _reduce(pool: _SolutionPool) -> None:
     """Backward elimination: the layer whose removal costs least is removed."""
     for m in range(pool.largest(), 1, -1):
         solution = pool.of(m)
@@ -284,7 +284,7 @@ def _reduce(pool: _Pool) -> None:
         pool.add([fitted(pool.grid, *start) for start in likeliest])
 
 
-def _complete(pool: _Pool) -> bool:
+def _complete(pool: _SolutionPool) -> bool:
     """Further layers where the coherent response lacks them; whether any was worth it."""
     completed = False
     while True:
@@ -315,7 +315,7 @@ def completed(grid: TextureGrid, solution: Solution) -> Solution:
     excess = solution.fit.slopes.misfit - solution.observed.scatter
     if not (excess[grid.recorded] > CLEAR_EVIDENCE).any():
         return solution
-    pool = _Pool(grid, None)
+    pool = _SolutionPool(grid, None)
     pool.add([solution])
     _complete(pool)
     return pool.best()
@@ -339,7 +339,7 @@ def in_frequency_order(grid: TextureGrid, solution: Solution) -> Solution:
     return max([solution, *tried], key=lambda s: s.evidence)
 
 
-def _spread(pool: _Pool) -> None:
+def _spread(pool: _SolutionPool) -> None:
     """Two or three layers spread over single spectra, every sign, carried to all conditions."""
     counts = range(2, MOST_SPREAD_LAYERS + 1) if pool.count is None else [pool.count]
     for count in counts:

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from modeling.files.described import Section, key
+from modeling.files.described import FileSection, key
 from modeling.files.kinds import Name
 
 
 @dataclass(frozen=True)
-class CompiledFor(Section):
+class CompiledFor(FileSection):
     """The scene of a compiled model, and what is kept in it."""
 
     WHERE = "compiled_for"

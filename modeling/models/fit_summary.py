@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from modeling.files.described import Section, key
+from modeling.files.described import FileSection, key
 
 _Distance = Annotated[float, key(unit="dB", ge=0, as_given=True)]
 
 
 @dataclass(frozen=True)
-class FitSummary(Section):
+class FitSummary(FileSection):
     """How near a fitted model should be to the truth, and what was found wrong.
 
     docs/method/fitting.md#expected-distance, docs/method/fitting.md#blends

@@ -224,7 +224,7 @@ class ChoiceStudies:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class People:
+class StudyPeople:
     """Abilities and effects of n people of B studies, and what textures and trends add.
 
     Parameters
@@ -265,7 +265,7 @@ class DrawnChoices:
     Parameters
     ----------
     studies : ChoiceStudies
-    people : People
+    people : StudyPeople
     mixture : EffectMixture
     level, person_sd : (B,) ndarray
         Mean and SD of people's abilities.
@@ -274,7 +274,7 @@ class DrawnChoices:
     """
 
     studies: ChoiceStudies
-    people: People
+    people: StudyPeople
     mixture: EffectMixture
     level: Floats
     person_sd: Floats
@@ -308,7 +308,7 @@ def drawn_choices(
         level = np.asarray(rng.normal(*priors.ability, studies), dtype=float)
         person_sd = np.sqrt(priors.person_sd**2 / rng.standard_gamma(2.0, studies))
     own = rng.standard_normal((2, studies, textures))
-    drawn = People(
+    drawn = StudyPeople(
         ability=level[:, None] + person_sd[:, None] * rng.standard_normal((studies, people)),
         effect=drawn_effects(mixture, people, rng=rng),
         textures=priors.texture_sd * own[0],

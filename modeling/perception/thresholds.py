@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from modeling.arrays import Floats
 from modeling.errors import InputError, shown
 from modeling.files.columns import ABOVE_0, Column, chosen
-from modeling.files.described import Section, key
+from modeling.files.described import FileSection, key
 from modeling.files.hashes import sha256_of_values
 from modeling.files.reading import read_text
 from modeling.files.tables import read_cells, typed
@@ -63,7 +63,7 @@ def displacement_to_acceleration_g(frequency_hz: ArrayLike, displacement_um: Arr
 
 
 @dataclass(frozen=True, eq=False)
-class Threshold(Section):
+class Threshold(FileSection):
     """A detection threshold, valid from its first to its last frequency.
 
     Raises

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from modeling.errors import InputError
-from modeling.files.described import Section, key
+from modeling.files.described import FileSection, key
 from modeling.files.described_json import DescribedJson
 from modeling.files.hashes import sha256_of_values
 from modeling.models.texture_model import TextureModel
@@ -21,7 +21,7 @@ _ADVICE = "simplify the model again"
 
 
 @dataclass(frozen=True)
-class LayerVerdict(Section):
+class LayerVerdict(FileSection):
     """The verdict on one layer, and its reason.
 
     The worst condition is the one in which what decides stands highest against the threshold.

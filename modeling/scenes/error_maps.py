@@ -21,7 +21,7 @@ from modeling.models.parameter_table import Parameters
 from modeling.models.texture_model import TextureModel
 from modeling.rendering.compiled import is_compiled
 from modeling.rendering.renderer import Renderer
-from modeling.scenes.measures import Errors, Features, Yardstick, errors_between
+from modeling.scenes.measures import ComparedBand, Errors, Features, errors_between
 from modeling.scenes.places import Places, nodes_of
 
 Segment = tuple[int, int]
@@ -38,10 +38,10 @@ class ErrorMaps:
     ----------
     model : TextureModel
         What is felt of the full model.
-    yardstick : Yardstick
+    yardstick : ComparedBand
     """
 
-    def __init__(self, model: TextureModel, yardstick: Yardstick) -> None:
+    def __init__(self, model: TextureModel, yardstick: ComparedBand) -> None:
         self.model, self.yardstick = model, yardstick
         self._speeds, self._forces = nodes_of(model)
         self.shape = (self._speeds.size, self._forces.size)

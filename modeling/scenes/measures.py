@@ -112,7 +112,7 @@ def allowed_by(bound: Bound) -> tuple[float, float, float]:
     return float(np.arccos(bound.gfc30)), bound.bands_db, bound.level_db
 
 
-class Yardstick:
+class ComparedBand:
     """What of a response is compared, in the band that an actuator plays.
 
     Parameters
@@ -157,10 +157,10 @@ class Yardstick:
         self._sine_squared, self._cosine_squared = np.sin(angle) ** 2, np.cos(angle) ** 2
 
     @staticmethod
-    def of(model: TextureModel, *, band_hz: Range | None) -> Yardstick:
+    def of(model: TextureModel, *, band_hz: Range | None) -> ComparedBand:
         """For a model and what is made of it; errors as above."""
         narrowest_hz = float(model.bandwidths_hz.min(initial=model.rate_hz))
-        return Yardstick(model.rate_hz, narrowest_hz=narrowest_hz, band_hz=band_hz)
+        return ComparedBand(model.rate_hz, narrowest_hz=narrowest_hz, band_hz=band_hz)
 
     @cached_property
     def _smoothing(self) -> Floats:

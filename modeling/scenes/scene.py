@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from modeling.arrays import Floats
 from modeling.checks import HIGHEST_FORCE_N, HIGHEST_SPEED_MM_S, is_number
 from modeling.errors import InputError, shown
-from modeling.files.described import DescribedFile, Section, key, keys_of, naming
+from modeling.files.described import DescribedFile, FileSection, key, keys_of, naming
 from modeling.files.hashes import sha256_of, sha256_of_values
 from modeling.files.kinds import Name, Rate, TextureNames
 from modeling.files.values import NameOrFile
@@ -75,7 +75,7 @@ StrokeRate = Annotated[
 
 
 @dataclass(frozen=True, kw_only=True)
-class HandRange(Section):
+class HandRange(FileSection):
     """A hand that may stay anywhere within a range of speeds and forces, or within all recorded.
 
     In every stroke it goes back and forth up to the highest speed and presses up and down through
@@ -94,7 +94,7 @@ class HandRange(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place(Section):
+class Place(FileSection):
     """Where a hand is, and for what share of its time."""
 
     WHERE: ClassVar[str] = "[[hand.place]]"
@@ -104,7 +104,7 @@ class Place(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
-class HandTable(Section):
+class HandTable(FileSection):
     """The hand of a scene file: a range, a recorded hand, or places with their shares."""
 
     WHERE: ClassVar[str] = "[hand]"
@@ -242,7 +242,7 @@ Amount = Annotated[float, key(ge=0, le=HIGHEST_BUDGET, as_given=True)]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Actuator(Section):
+class Actuator(FileSection):
     """What plays the output; None for no such limit."""
 
     WHERE: ClassVar[str] = "[actuator]"
@@ -283,7 +283,7 @@ class Actuator(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bound(Section):
+class Bound(FileSection):
     """How far a compiled model may be from what is felt of the full one, wherever the hand is.
 
     The full model's response is known exactly, so that a GFC of 1 is attainable.
@@ -318,7 +318,7 @@ class Bound(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Budget(Section):
+class Budget(FileSection):
     """What a scene may cost at most; a micro-controller gives what is not given."""
 
     WHERE: ClassVar[str] = "[budget]"

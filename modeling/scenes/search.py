@@ -27,7 +27,7 @@ from modeling.scenes.cost import stored_numbers
 from modeling.scenes.error_maps import ErrorMaps
 from modeling.scenes.felt import at_places, kept_layers
 from modeling.scenes.limit_losses import limit_loss_db
-from modeling.scenes.measures import Errors, Yardstick
+from modeling.scenes.measures import ComparedBand, Errors
 from modeling.scenes.places import places_of
 from modeling.scenes.restricting import played, thinned
 from modeling.scenes.scene import Bound, Scene
@@ -105,7 +105,7 @@ class Search:
         self.places = places_of(full, scene.hand)
         band_hz, name = scene.actuator.band_hz, full.texture
         self.yardstick = known.get(
-            ("yardstick", name, band_hz), partial(Yardstick.of, full, band_hz=band_hz)
+            ("yardstick", name, band_hz), partial(ComparedBand.of, full, band_hz=band_hz)
         )
         self.rate_hz = scene.actuator.rate_hz or full.rate_hz
         groups = known.get(("groups", name), lambda: own_peaks(full).groups)
@@ -334,6 +334,6 @@ class Search:
 
     def _loss_db(self) -> Floats:
         """What peak and RMS limits take from the full model's level at the places that count."""
-        whole = Yardstick.of(self.full, band_hz=None)
+        whole = ComparedBand.of(self.full, band_hz=None)
         rms = np.sqrt(whole.power(at_places(self.full, self.places)))
         return limit_loss_db(rms, self.scene.actuator.limits)

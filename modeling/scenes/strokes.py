@@ -14,7 +14,7 @@ from modeling.hand import Hand
 from modeling.models.texture_model import TextureModel
 from modeling.rendering.renderer import Renderer
 from modeling.scenes.compiled import CompiledTexture
-from modeling.scenes.measures import Features, Yardstick, errors_between
+from modeling.scenes.measures import ComparedBand, Features, errors_between
 from modeling.scenes.places import ranges_of
 from modeling.scenes.scene import STROKE_HZ, HandRange, HandUse, Scene
 from modeling.seeds import generator
@@ -51,7 +51,7 @@ def windows_kept(
         Of the stroke and the noise.
     """
     plan = compiled.plan
-    yardstick = Yardstick.of(compiled.full, band_hz=scene.actuator.band_hz)
+    yardstick = ComparedBand.of(compiled.full, band_hz=scene.actuator.band_hz)
     settling, window = (round(s * plan.rate_hz) for s in (SETTLING_S, WINDOW_S))
     samples = settling + count * window
     hand = random_stroke(compiled.full, scene.hand, samples, rate_hz=plan.rate_hz, seed=seed)
@@ -93,7 +93,7 @@ def random_stroke(
     return Hand(*(x[leg] + (x[leg + 1] - x[leg]) * passed for x in (speeds, forces)))
 
 
-def _windows(samples: Floats, yardstick: Yardstick, rate_hz: float) -> Features:
+def _windows(samples: Floats, yardstick: ComparedBand, rate_hz: float) -> Features:
     """Of windows (k, n): the mean power around each frequency of the yardstick."""
     power = np.abs(np.fft.rfft(samples * np.hanning(samples.shape[1]))) ** 2
     frequency = np.fft.rfftfreq(samples.shape[1], 1 / rate_hz)

@@ -125,7 +125,7 @@ def _check(
 
 
 @dataclass(frozen=True)
-class Level:
+class MeasuredLevel:
     """Gain over several placements of the pen, which is picked up again each time.
 
     Parameters
@@ -146,7 +146,7 @@ class Level:
     placements: int
 
 
-def level_of(gains: Sequence[float]) -> Level:
+def level_of(gains: Sequence[float]) -> MeasuredLevel:
     """The gain over placements, with its interval and spread.
 
     Raises
@@ -165,7 +165,7 @@ def level_of(gains: Sequence[float]) -> Level:
     spread = float(logs.std(ddof=1))
     half = float(t.ppf((1 + CONFIDENCE) / 2, logs.size - 1)) * spread / np.sqrt(logs.size)
     mean = float(logs.mean())
-    return Level(
+    return MeasuredLevel(
         gain=float(np.exp(mean)),
         low=float(np.exp(mean - half)),
         high=float(np.exp(mean + half)),

@@ -17,7 +17,7 @@ from modeling.vibrators.vibrator import Vibrator
 from rig.calibration.alignment import Aligned, aligned
 from rig.calibration.floor import Floor
 from rig.calibration.latency import LatencySummary
-from rig.calibration.level import BandGain, Level, band_gain, check_unclipped
+from rig.calibration.level import BandGain, MeasuredLevel, band_gain, check_unclipped
 from rig.calibration.measuring import LOST, Accelerometer, PlaysSignals
 from rig.calibration.signals import noise_signal
 from rig.hand.pressure import PressureCurve
@@ -130,7 +130,7 @@ def mean_pressure(live: Live, *, seconds: float = PRESSURE_S) -> float:
 
 
 def level_figures(
-    rig: RigFile, level: Level, *, band_hz: tuple[float, float], today: datetime.date
+    rig: RigFile, level: MeasuredLevel, *, band_hz: tuple[float, float], today: datetime.date
 ) -> dict[str, object]:
     """The calibration at the held pen, from acceleration per g asked for."""
     old = rig.vibrator.g_per_volt.value

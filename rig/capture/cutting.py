@@ -31,7 +31,7 @@ Readings = NDArray[np.void]
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class StrokePart:
     """A part of a stroke during which the hand stayed in one cell of the grid.
 
     Parameters
@@ -134,7 +134,7 @@ class StrokeCutter:
         cell = self._run.cell
         return None if cell == NOWHERE else self.grid.conditions[cell]
 
-    def feed(self, samples: Floats, time_s: Floats, readings: Readings) -> list[Piece]:
+    def feed(self, samples: Floats, time_s: Floats, readings: Readings) -> list[StrokePart]:
         """Take what came since the last call; the pieces that ended in it.
 
         Parameters
@@ -160,14 +160,14 @@ class StrokeCutter:
             self._forget_readings(float(ready[0, -1]))
         return self._cut(ready, hand)
 
-    def end_stroke(self) -> list[Piece]:
+    def end_stroke(self) -> list[StrokePart]:
         """End the open piece: what comes next does not follow on what came (samples were lost)."""
         self._waiting = _no_samples()
         self._high_pass.restart()
         return self._close()
 
-    def _cut(self, ready: Floats, hand: _Hand) -> list[Piece]:
-        pieces: list[Piece] = []
+    def _cut(self, ready: Floats, hand: _Hand) -> list[StrokePart]:
+        pieces: list[StrokePart] = []
         cells = self.grid.cells(hand.speed_mm_s, hand.force_n)
         edges = np.flatnonzero(np.diff(cells)) + 1
         for begin, end in zip([0, *edges], [*edges, cells.size], strict=True):
@@ -181,7 +181,7 @@ class StrokeCutter:
                 pieces += self._split()
         return pieces
 
-    def _split(self) -> list[Piece]:
+    def _split(self) -> list[StrokePart]:
         """The pieces of full length that the open run holds."""
         pieces = []
         while self._run.size >= self._longest:
@@ -190,14 +190,14 @@ class StrokeCutter:
             self._run = rest
         return pieces
 
-    def _close(self) -> list[Piece]:
+    def _close(self) -> list[StrokePart]:
         run, self._run = self._run, _Run(NOWHERE)
         return [self._piece(run)] if run.size >= self._shortest else []
 
-    def _piece(self, run: _Run) -> Piece:
+    def _piece(self, run: _Run) -> StrokePart:
         samples, hand = run.whole()
         speed = np.abs(hand.speed_mm_s)
-        return Piece(
+        return StrokePart(
             self.grid.conditions[run.cell],
             samples[2],
             float(samples[0, 0]),
@@ -278,7 +278,7 @@ def cut_strokes(
     g_per_fullscale: float = 1.0,
     longest_s: float = 1.0,
     speed_delay_s: float = 0.0,
-) -> dict[Condition, list[Piece]]:
+) -> dict[Condition, list[StrokePart]]:
     """The pieces of a whole recording of strokes, by condition.
 
     Parameters
@@ -305,9 +305,9 @@ def cut_strokes(
     return by_condition(pieces)
 
 
-def by_condition(pieces: Iterable[Piece]) -> dict[Condition, list[Piece]]:
+def by_condition(pieces: Iterable[StrokePart]) -> dict[Condition, list[StrokePart]]:
     """Pieces under the condition that each belongs to, in their order."""
-    found: dict[Condition, list[Piece]] = {}
+    found: dict[Condition, list[StrokePart]] = {}
     for piece in pieces:
         found.setdefault(piece.condition, []).append(piece)
     return found

@@ -39,7 +39,7 @@ from modeling.recordings.recording_set import (
     stated,
 )
 from rig.capture.coverage import Coverage
-from rig.capture.cutting import SHORTEST_S, Piece
+from rig.capture.cutting import SHORTEST_S, StrokePart
 from rig.capture.grid import StrokeGrid
 from rig.capture.joining import joined, joined_samples
 
@@ -182,7 +182,7 @@ class PieceStore:
         """Whether any piece of this repeat is."""
         return self.plan.simulated or any(one.simulated for one in self._kept)
 
-    def add(self, piece: Piece) -> bool:
+    def add(self, piece: StrokePart) -> bool:
         """Keep a piece; its condition's recording is made once there is enough of it.
 
         Returns
@@ -353,7 +353,7 @@ class PieceStore:
         pieces = [self._samples(one) for one in chosen]
         return joined(pieces, self.plan.rate_hz)[: self.plan.wanted_samples]
 
-    def _row(self, name: str, piece: Piece) -> dict[str, object]:
+    def _row(self, name: str, piece: StrokePart) -> dict[str, object]:
         values = (
             *(name, self.plan.texture, *piece.condition, self.plan.repeat),
             *(self.plan.rate_hz, piece.samples_g.size),

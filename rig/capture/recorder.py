@@ -19,9 +19,9 @@ from rig.capture.clock import SampleClock
 from rig.capture.coverage import Coverage, advice
 from rig.capture.cutting import (
     CLIPPED_FROM,
-    Piece,
     Readings,
     StrokeCutter,
+    StrokePart,
     on_surface,
 )
 from rig.capture.grid import NOWHERE, StrokeGrid
@@ -39,7 +39,7 @@ MOSTLY_OUTSIDE = 0.5
 JUDGED_FROM_S = 10.0
 
 
-class Source(Protocol):
+class AccelerationSource(Protocol):
     """Where blocks of acceleration come from, such as `rig.capture.input.AudioInput`."""
 
     @property
@@ -51,7 +51,7 @@ class Source(Protocol):
 
 
 @dataclass(frozen=True)
-class Level:
+class InputLevel:
     """The input lately, in g: RMS and peak over 1 s, and the RMS at rest (NaN before any)."""
 
     rms_g: float
@@ -75,7 +75,7 @@ class StrokeRecorder:
 
     Parameters
     ----------
-    source : Source
+    source : AccelerationSource
     readings : callable
         Gives the readings of the hand since its last call.
     store : PieceStore
@@ -88,7 +88,7 @@ class StrokeRecorder:
 
     def __init__(
         self,
-        source: Source,
+        source: AccelerationSource,
         readings: Callable[[], Readings],
         *,
         store: PieceStore,
@@ -155,7 +155,7 @@ class StrokeRecorder:
         return self.store.coverage
 
     @property
-    def level(self) -> Level:
+    def level(self) -> InputLevel:
         """The input lately."""
         return self._meter.level()
 
@@ -229,7 +229,7 @@ class StrokeRecorder:
         self._meter.add(block.samples, resting=self._trace.resting)
         self._keep(self._cutter.feed(block.samples, time_s, readings))
 
-    def _keep(self, pieces: list[Piece]) -> None:
+    def _keep(self, pieces: list[StrokePart]) -> None:
         for piece in pieces:
             self.store.add(piece)
 
@@ -255,7 +255,7 @@ def check_assumed_force(grid: StrokeGrid, force_n: float) -> None:
 
 
 class _Meter:
-    """Level, clipping and floor of the input."""
+    """InputLevel, clipping and floor of the input."""
 
     def __init__(self, rate_hz: float, g_per_fullscale: float) -> None:
         self._rate_hz = rate_hz
@@ -278,11 +278,11 @@ class _Meter:
             if not found >= self._floor_g:  # the lowest so far, or the first
                 self._floor_g, self.hum_hz = found, mains_in(rest, self._rate_hz)
 
-    def level(self) -> Level:
+    def level(self) -> InputLevel:
         """As it is now; all 0 before the first block."""
         samples = np.concatenate(self._recent) if self._recent else np.zeros(1)
         peak = float(np.abs(samples).max())
-        return Level(
+        return InputLevel(
             self._scale_g * _rms(samples),
             self._scale_g * peak,
             self._floor_g,

@@ -48,7 +48,7 @@ LOOK_S = 0.1  # interval of checks while waiting for a burst
 
 
 @dataclass(frozen=True)
-class Parts:
+class RigParts:
     """What an open rig consists of."""
 
     live: Live
@@ -93,7 +93,7 @@ class DeskRig:
         self._override = override
         self._seed = seed
         self._stack = ExitStack()
-        self._open: Parts | None = None
+        self._open: RigParts | None = None
         self._opened_s = 0.0
         self._presentations = 0
         self._now: PresentationRecord | None = None
@@ -112,7 +112,7 @@ class DeskRig:
         return self._file.simulated
 
     @property
-    def parts(self) -> Parts:
+    def parts(self) -> RigParts:
         """What it consists of while it is open, for those who show it live."""
         if self._open is None:
             raise RuntimeError("the rig is closed")
@@ -170,7 +170,7 @@ class DeskRig:
             pen = None
             if self._file.accelerometer is not None:
                 pen = stack.enter_context(Pen(self._file.accelerometer))
-            self._open = Parts(live, sound, reader, journal, pen)
+            self._open = RigParts(live, sound, reader, journal, pen)
             self._stack = stack.pop_all()
         self._presentations, self._lost, self._pen_lost = 0, 0, False
         self._ended, self._faults = [], []

@@ -25,7 +25,7 @@ class Take(Message, frozen=True):
     """What was kept since the last request of this kind?"""
 
 
-class Piece(Message, frozen=True):
+class SampleBlock(Message, frozen=True):
     """Samples in g, as bytes of float32, of which none is missing, and when the first was taken."""
 
     start_s: float
@@ -36,7 +36,7 @@ class Taken(Message, frozen=True):
     """The answer, and whether the input still runs."""
 
     runs: bool
-    pieces: tuple[Piece, ...]
+    pieces: tuple[SampleBlock, ...]
 
 
 Request = Begin | End | Take

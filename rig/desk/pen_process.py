@@ -11,7 +11,7 @@ import threading
 import numpy as np
 
 from rig.capture.input import AudioInput, InputBlock, InputSettings
-from rig.desk.messages import Begin, End, Listening, Piece, Request, Take, Taken
+from rig.desk.messages import Begin, End, Listening, Request, SampleBlock, Take, Taken
 from rig.live.driven import Parent
 from rig.live.messages import Done, Message
 
@@ -108,9 +108,9 @@ def _answer(log: PenLog, source: AudioInput, *, request: Request) -> Message:
     return Done()
 
 
-def _piece(blocks: list[InputBlock], scale: float) -> Piece:
+def _piece(blocks: list[InputBlock], scale: float) -> SampleBlock:
     samples_g = scale * np.concatenate([block.samples for block in blocks])
-    return Piece(blocks[0].time_s, samples_g.astype(np.float32).tobytes())
+    return SampleBlock(blocks[0].time_s, samples_g.astype(np.float32).tobytes())
 
 
 if __name__ == "__main__":

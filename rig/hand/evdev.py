@@ -29,10 +29,10 @@ from rig.hand.events import (
     EVENT,
     REL_X,
     REL_Y,
-    Axis,
+    AbsoluteAxis,
     Frame,
     FrameReader,
-    Hand,
+    HandOfFrames,
     MouseHand,
     PenHand,
     State,
@@ -117,14 +117,14 @@ class EventDevice:
     handle : int
         File descriptor, which this closes.
     name : str
-    hand : Hand
+    hand : HandOfFrames
         Makes samples of its frames.
     """
 
     rest_s = REST_S
     firmware = ""
 
-    def __init__(self, handle: int, name: str, *, hand: Hand) -> None:
+    def __init__(self, handle: int, name: str, *, hand: HandOfFrames) -> None:
         self.name = name
         self._handle = handle
         self._hand = hand
@@ -231,7 +231,7 @@ def _listed(devices: tuple[ConnectedDevice, ...] | list[ConnectedDevice]) -> str
     return ", ".join(map(str, devices)) or "none"
 
 
-def _hand(handle: int, settings: HandSettings, *, name: str) -> Hand:
+def _hand(handle: int, settings: HandSettings, *, name: str) -> HandOfFrames:
     if settings.kind == "mouse":
         assert settings.counts_per_mm is not None  # which the settings make sure of
         return MouseHand(settings.counts_per_mm)
@@ -246,14 +246,14 @@ def _hand(handle: int, settings: HandSettings, *, name: str) -> Hand:
     return PenHand(axes, curve, state=_state(handle))
 
 
-def _axes(handle: int, settings: HandSettings, *, name: str) -> dict[int, Axis]:
+def _axes(handle: int, settings: HandSettings, *, name: str) -> dict[int, AbsoluteAxis]:
     """The axes of a tablet: X and Y with steps per mm, and pressure where there is such."""
     axes = {}
     for code in (ABS_X, ABS_Y, ABS_PRESSURE):
         found = _asked(handle, eviocgabs(code), _ABSINFO.size)
         if found is not None:
             _, low, high, _, _, resolution = _ABSINFO.unpack(found)
-            axes[code] = Axis(low, high, settings.counts_per_mm or float(resolution))
+            axes[code] = AbsoluteAxis(low, high, settings.counts_per_mm or float(resolution))
     if axes.get(ABS_PRESSURE) and axes[ABS_PRESSURE].high <= axes[ABS_PRESSURE].low:
         del axes[ABS_PRESSURE]
     if ABS_X not in axes or ABS_Y not in axes:

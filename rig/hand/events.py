@@ -94,7 +94,7 @@ class FrameReader:
 
 
 @dataclass(frozen=True)
-class Axis:
+class AbsoluteAxis:
     """An absolute axis of a device: its range, and how many steps are 1 mm (0: not stated)."""
 
     low: int
@@ -106,7 +106,7 @@ class Axis:
         return (value - self.low) / (self.high - self.low) if self.high > self.low else nan
 
 
-class Hand(Protocol):
+class HandOfFrames(Protocol):
     """Makes samples of the frames of one kind of device."""
 
     def sample(self, frame: Frame) -> Sample:
@@ -121,7 +121,7 @@ class PenHand:
 
     Parameters
     ----------
-    axes : mapping of int to Axis
+    axes : mapping of int to AbsoluteAxis
         ABS_X and ABS_Y with steps per mm; ABS_PRESSURE where the tablet has it.
     curve : PressureCurve or None
         Force over pressure; None where it is not known.
@@ -131,7 +131,7 @@ class PenHand:
     """
 
     def __init__(
-        self, axes: Mapping[int, Axis], curve: PressureCurve | None, *, state: State
+        self, axes: Mapping[int, AbsoluteAxis], curve: PressureCurve | None, *, state: State
     ) -> None:
         self._axes = axes
         self._curve = curve if ABS_PRESSURE in axes else None

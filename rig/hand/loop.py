@@ -10,7 +10,7 @@ from contextlib import suppress
 
 from rig.hand.devices import open_device
 from rig.hand.following import Follower, Reading
-from rig.hand.messages import Counts, Fault, Firmware
+from rig.hand.messages import Counts, Firmware, HandFault
 from rig.hand.sample import LOST_S, Device, DeviceLost
 from rig.hand.settings import HandSettings
 from rig.hand.tracking import REST_S
@@ -20,7 +20,7 @@ BEAT_S = 0.002  # readings are written so often at most, and at rest
 AGAIN_S = 0.5  # between attempts to open a device that is gone
 COUNTS_S = 1.0  # between reports of what was read and lost
 
-Tell = Callable[[Fault | Counts | Firmware], None]
+Tell = Callable[[HandFault | Counts | Firmware], None]
 
 
 class HandLoop:
@@ -135,7 +135,7 @@ class HandLoop:
                 f"expected the readings of the {device.name} within {LOST_S:g} s, got "
                 f"{late - self._late} that came later and were dropped; close other programs."
             )
-            self._tell(Fault(told))
+            self._tell(HandFault(told))
             self._late = late
 
     def _report(self, counts: dict[str, int]) -> None:
@@ -151,7 +151,7 @@ class HandLoop:
         self._again_s = now_s() + AGAIN_S
         if why != self._told:
             self._told = why
-            self._tell(Fault(why))
+            self._tell(HandFault(why))
 
     def _open_again(self) -> None:
         """Try to open the device in a thread: a sensor may take seconds, and the beat goes on."""

@@ -29,7 +29,7 @@ class Ready(Message, frozen=True):
     name: str
 
 
-class Fault(Message, frozen=True):
+class HandFault(Message, frozen=True):
     """Something went wrong: one sentence."""
 
     told: str
@@ -47,4 +47,4 @@ class Firmware(Message, frozen=True):
     version: str
 
 
-Report = Ready | Fault | Counts | Firmware | Done
+Report = Ready | HandFault | Counts | Firmware | Done

@@ -12,7 +12,7 @@ from contextlib import suppress
 
 from modeling.errors import InputError
 from rig.hand.loop import HandLoop
-from rig.hand.messages import Fault, ReadHand, Ready, Unplug
+from rig.hand.messages import HandFault, ReadHand, Ready, Unplug
 from rig.live.driven import Parent
 from rig.live.memory import Live
 from rig.live.messages import Done
@@ -43,7 +43,7 @@ def _open(parent: Parent, loop: HandLoop, *, patient: bool) -> None:
     except InputError as error:
         if not patient:
             raise
-        parent.tell(Fault(str(error)))
+        parent.tell(HandFault(str(error)))
 
 
 def _listen(parent: Parent, loop: HandLoop, parent_gone: threading.Event) -> None:

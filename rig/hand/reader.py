@@ -8,7 +8,7 @@ from contextlib import suppress
 
 from modeling.errors import InputError
 from rig.hand.following import Follower
-from rig.hand.messages import Counts, Fault, Firmware, ReadHand, Ready, Report, Unplug
+from rig.hand.messages import Counts, Firmware, HandFault, ReadHand, Ready, Report, Unplug
 from rig.hand.settings import HandSettings
 from rig.hand.tracking import REST_S
 from rig.hand.window import WindowHand
@@ -181,10 +181,10 @@ class HandReader:
             try:
                 report: Report = child.hear(Report)
             except InputError as refusal:
-                report = Fault(str(refusal))
+                report = HandFault(str(refusal))
             self._alive_s = min(self._alive_s, now_s())
             match report:
-                case Fault(told):
+                case HandFault(told):
                     self._add_fault(told)
                 case Counts(counts):
                     self._counts = counts

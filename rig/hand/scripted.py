@@ -64,7 +64,7 @@ class Steady:
         return self._speed_mm_s * time_s, 0.0, self._force_n
 
 
-class Trajectory:
+class ScriptedTrajectory:
     """A hand that was written down, played once; afterwards it is lifted.
 
     Parameters
@@ -89,7 +89,7 @@ class Trajectory:
         self._rows = rows
 
     @classmethod
-    def load(cls, path: str | Path) -> Trajectory:
+    def load(cls, path: str | Path) -> ScriptedTrajectory:
         """From a table with the columns time_s, x_mm, y_mm and force_n."""
         rows = read_table(path, COLUMNS)
         time_s, x_mm, y_mm, force_n = (
@@ -149,7 +149,7 @@ class ScriptedHand:
 def script_of(settings: HandSettings) -> Script:
     """The script that is named in the settings."""
     if settings.script not in SCRIPTS:
-        return Trajectory.load(settings.script)
+        return ScriptedTrajectory.load(settings.script)
     if settings.script == "hold":
         return Steady(settings.speed_mm_s, settings.force_n)
     return Strokes(settings.speed_mm_s, settings.force_n, per_s=settings.strokes_per_s)

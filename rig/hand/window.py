@@ -17,7 +17,7 @@ from rig.live.memory import Live, now_s
 _MOST_PUSHED = 10_000
 
 
-class Pointer:
+class PointerDevice:
     """The pointer of a window as a device: what is pushed at one end is read at the other.
 
     Parameters
@@ -69,7 +69,7 @@ class WindowHand:
 
     def __init__(self, live: Live, settings: HandSettings) -> None:
         assert settings.counts_per_mm is not None  # which the settings make sure of
-        self.pointer = Pointer(settings.counts_per_mm)
+        self.pointer = PointerDevice(settings.counts_per_mm)
         self._loop = HandLoop(
             live, settings, tell=lambda told: None, opening=lambda settings: self.pointer
         )

@@ -22,7 +22,7 @@ _SAME = 1e-3
 
 
 @dataclass(frozen=True)
-class Axis:
+class GridAxis:
     """Speeds (mm/s) or forces (N) of a grid, and how they are spaced.
 
     Parameters
@@ -50,13 +50,13 @@ class ToolkitGrid:
 
     Parameters
     ----------
-    speeds, forces : Axis
+    speeds, forces : GridAxis
     inside : int
         Number of nodes within the hull of the file's triangles, and with vibration.
     """
 
-    speeds: Axis
-    forces: Axis
+    speeds: GridAxis
+    forces: GridAxis
     inside: int
 
     @property
@@ -106,7 +106,7 @@ def spanning_grid(
 
 def _axes_of(
     texture: HattTexture, speeds_mm_s: Sequence[float] | None, forces_n: Sequence[float] | None
-) -> tuple[list[Axis], list[Axis]]:
+) -> tuple[list[GridAxis], list[GridAxis]]:
     """What each axis may be."""
     if speeds_mm_s is not None and forces_n is not None:
         return [_given(speeds_mm_s)], [_given(forces_n)]
@@ -123,18 +123,18 @@ def _axes_of(
     )
 
 
-def _given(values: Sequence[float]) -> Axis:
-    return Axis(tuple(map(float, values)), "given")
+def _given(values: Sequence[float]) -> GridAxis:
+    return GridAxis(tuple(map(float, values)), "given")
 
 
-def _spanning(values: Floats) -> list[Axis]:
+def _spanning(values: Floats) -> list[GridAxis]:
     """Axes over the range of some values, equal steps first."""
     low, high = float(values.min()), float(values.max())
     if _coincide(values):
-        return [Axis((low,), "single")]
+        return [GridAxis((low,), "single")]
     return [
-        Axis(tuple(np.linspace(low, high, NODES_PER_AXIS).tolist()), "linear"),
-        Axis(tuple(np.geomspace(low, high, NODES_PER_AXIS).tolist()), "logarithmic"),
+        GridAxis(tuple(np.linspace(low, high, NODES_PER_AXIS).tolist()), "linear"),
+        GridAxis(tuple(np.geomspace(low, high, NODES_PER_AXIS).tolist()), "logarithmic"),
     ]
 
 
@@ -142,6 +142,6 @@ def _coincide(values: Floats) -> bool:
     return bool(np.ptp(values) <= _SAME * values.max())
 
 
-def _covered(texture: HattTexture, speeds: Axis, forces: Axis) -> ToolkitGrid:
+def _covered(texture: HattTexture, speeds: GridAxis, forces: GridAxis) -> ToolkitGrid:
     grid = ToolkitGrid(speeds, forces, 0)
     return replace(grid, inside=len(texture.conditions_inside(grid.conditions)))

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Annotated, ClassVar
 
 from modeling.errors import counted
-from modeling.files.described import Section, key
+from modeling.files.described import FileSection, key
 
 Points = tuple[tuple[float, float], ...]
 Unit = Annotated[str, key("that of the quantity", advice="convert the value and write that unit")]
@@ -24,7 +24,7 @@ Source = Annotated[
 
 
 @dataclass(frozen=True)
-class Figure(Section):
+class Figure(FileSection):
     """A physical quantity of a rig."""
 
     QUANTITY: ClassVar[str] = "value"
@@ -42,7 +42,7 @@ def _rises(points: Points) -> bool:
 
 
 @dataclass(frozen=True)
-class Curve(Section):
+class Curve(FileSection):
     """A quantity that follows another one: points of both, straight lines between them."""
 
     QUANTITY: ClassVar[str] = "points"

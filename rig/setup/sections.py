@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal
 
 from modeling import InputError
-from modeling.files.described import Section, key
+from modeling.files.described import FileSection, key
 from modeling.files.kinds import Name, Rate
 from rig.setup.figures import Curve, Figure
 
@@ -23,7 +23,7 @@ def _assumed(value: float, unit: str) -> Figure:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RigName(Section):
+class RigName(FileSection):
     """Which rig this is."""
 
     WHERE: ClassVar[str] = "[rig]"
@@ -37,7 +37,7 @@ class RigName(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SoundSection(Section):
+class SoundSection(FileSection):
     """The sound card. Channels count from 1."""
 
     WHERE: ClassVar[str] = "[sound]"
@@ -105,7 +105,7 @@ class SoundSection(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
-class VibratorSection(Section):
+class VibratorSection(FileSection):
     """The vibrator: its identified resonance, and its calibration at the held pen."""
 
     WHERE: ClassVar[str] = "[vibrator]"
@@ -125,7 +125,7 @@ class VibratorSection(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
-class LimitsSection(Section):
+class LimitsSection(FileSection):
     """What the hand gets at most ([why](method/rendering.md#limits))."""
 
     WHERE: ClassVar[str] = "[limits]"
@@ -155,7 +155,7 @@ class LimitsSection(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
-class HandSection(Section):
+class HandSection(FileSection):
     """What measures the hand, and what is assumed where it measures nothing."""
 
     WHERE: ClassVar[str] = "[hand]"
@@ -244,7 +244,7 @@ class HandSection(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
-class AccelerometerSection(Section):
+class AccelerometerSection(FileSection):
     """What measures at the pen, which sessions then record."""
 
     WHERE: ClassVar[str] = "[accelerometer]"
@@ -263,7 +263,7 @@ class AccelerometerSection(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
-class LatencySection(Section):
+class LatencySection(FileSection):
     """From the hand to the vibration, end to end; `tactileq rig latency` writes it."""
 
     WHERE: ClassVar[str] = "[latency]"
@@ -276,7 +276,7 @@ class LatencySection(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
-class CalibrationSection(Section):
+class CalibrationSection(FileSection):
     """When the rig was calibrated, and as which one; `tactileq rig calibrate` writes it."""
 
     WHERE: ClassVar[str] = "[calibration]"
@@ -286,7 +286,7 @@ class CalibrationSection(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RealSurfaceSection(Section):
+class RealSurfaceSection(FileSection):
     """The real surface beside the virtual one."""
 
     WHERE: ClassVar[str] = "[real_surface]"

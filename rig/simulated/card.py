@@ -6,7 +6,7 @@ from modeling.errors import InputError
 from rig.live.child import Child, ChildLost
 from rig.live.messages import Done
 from rig.simulated.process import Card
-from rig.simulated.vibrator import SimulatedVibrator
+from rig.simulated.vibrator import SimulatedTransducers
 
 DEVICE = "simulated-vibrator"
 
@@ -19,13 +19,13 @@ class SimulatedCard:
 
     Parameters
     ----------
-    vibrator : SimulatedVibrator, optional
+    vibrator : SimulatedTransducers, optional
     name : str
         By which PortAudio lists it.
     """
 
-    def __init__(self, vibrator: SimulatedVibrator | None = None, *, name: str = DEVICE) -> None:
-        self.vibrator = vibrator or SimulatedVibrator()
+    def __init__(self, vibrator: SimulatedTransducers | None = None, *, name: str = DEVICE) -> None:
+        self.vibrator = vibrator or SimulatedTransducers()
         self.name = name
         self._child: Child | None = None
 

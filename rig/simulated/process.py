@@ -15,7 +15,7 @@ from modeling.arrays import Floats
 from modeling.errors import InputError, shown
 from rig.live.driven import Parent
 from rig.live.messages import Done, Message
-from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedVibrator
+from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
 from rig.sound.devices import SoundDevice, portaudio, sound_devices
 
 CHANNELS = 2
@@ -24,7 +24,7 @@ CHANNELS = 2
 class Card(Message, frozen=True):
     """What it is started with."""
 
-    vibrator: SimulatedVibrator
+    vibrator: SimulatedTransducers
     name: str
 
 
@@ -38,7 +38,7 @@ def main() -> None:
         parent.serve(Done, lambda done: done)
 
 
-def _stream(vibrator: SimulatedVibrator, *, name: str) -> Any:
+def _stream(vibrator: SimulatedTransducers, *, name: str) -> Any:
     """A stream that drives the vibrator from the first channel and returns its accelerometer.
 
     The other channel comes back as it is played.

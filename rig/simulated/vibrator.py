@@ -33,7 +33,7 @@ _RANGES = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class SimulatedVibrator:
+class SimulatedTransducers:
     """What is known of a simulated vibrator and of the accelerometer that it shakes.
 
     It answers a drive w by G_w·(w + (R − 1)·H_BP(w)), one layer as `modeling.vibrators.Vibrator`
@@ -82,7 +82,7 @@ class SimulatedVibrator:
         check_height(self.height)
 
     @classmethod
-    def load(cls, path: Path) -> SimulatedVibrator:
+    def load(cls, path: Path) -> SimulatedTransducers:
         """From a TOML file whose keys are these parameters; what it leaves out is as above."""
         values = read_toml(path, "the file of a simulated vibrator")
         check_keys(values, [field.name for field in fields(cls)], where=str(path))
@@ -105,7 +105,7 @@ class SimulatedAccelerometer:
 
     Parameters
     ----------
-    vibrator : SimulatedVibrator
+    vibrator : SimulatedTransducers
     rate_hz : float
         Of both signals.
 
@@ -115,7 +115,7 @@ class SimulatedAccelerometer:
         For a resonance that this rate does not hold.
     """
 
-    def __init__(self, vibrator: SimulatedVibrator, *, rate_hz: float) -> None:
+    def __init__(self, vibrator: SimulatedTransducers, *, rate_hz: float) -> None:
         check_rate(rate_hz)
         check_band(vibrator.frequency_hz, vibrator.bandwidth_hz, rate_hz=rate_hz)
         self._vibrator = vibrator
@@ -146,7 +146,7 @@ class SimulatedAccelerometer:
         return clipped
 
 
-def _coefficients(vibrator: SimulatedVibrator, *, rate_hz: float) -> tuple[Floats, Floats]:
+def _coefficients(vibrator: SimulatedTransducers, *, rate_hz: float) -> tuple[Floats, Floats]:
     """Numerator and denominator in z⁻¹ of G_w·(1 + (R − 1)·H_BP), as in docs/method/equalizer.md.
 
     Multiplied out with t = (1 − z⁻¹)/(1 + z⁻¹): H_BP = k(1+g²)t/(g² + k(1+g²)t + t²).

@@ -146,7 +146,7 @@ def _tables(
     scene: str, indices: Sequence[str], textures: Sequence[Mapping[str, Any]], *, noise: int
 ) -> str:
     """All arrays, the textures, their indices, the scene and the memory that a hand needs, in C."""
-    pool = _Pool(scene)
+    pool = _ArrayPool(scene)
     entries = [initializer(members, pool.names_of(members), indent=8) for members in textures]
     reals = _largest(textures)
     return "".join(
@@ -164,7 +164,7 @@ def _tables(
     )
 
 
-class _Pool:
+class _ArrayPool:
     """Arrays of several textures, those that are equal bit for bit once."""
 
     def __init__(self, scene: str) -> None:

@@ -6,13 +6,13 @@ from pathlib import Path
 
 from modeling import InputError
 from modeling.files.writing import write_bytes
-from stimuli.sets.manifest import Stimulus
+from stimuli.sets.manifest import StimulusRow
 from stimuli.sets.recipe import Recipe
 from stimuli.sets.sources import Sources, load_sources
 from stimuli.sets.writing import check_clipping, rendered, stimulus_count
 
 
-def write_wav(path: str | Path, recipe: Recipe, *, sources: Sources | None = None) -> Stimulus:
+def write_wav(path: str | Path, recipe: Recipe, *, sources: Sources | None = None) -> StimulusRow:
     """Write the only stimulus of a recipe to a WAV file, by default 32-bit floats in g.
 
     Parameters
@@ -26,7 +26,7 @@ def write_wav(path: str | Path, recipe: Recipe, *, sources: Sources | None = Non
 
     Returns
     -------
-    Stimulus
+    StimulusRow
         The file's row of a manifest: unit, rms, level_db (dB re 1 g), peak and so on.
 
     Raises
@@ -39,7 +39,7 @@ def write_wav(path: str | Path, recipe: Recipe, *, sources: Sources | None = Non
     return stimulus
 
 
-def only_stimulus(recipe: Recipe, sources: Sources) -> tuple[Stimulus, bytes]:
+def only_stimulus(recipe: Recipe, sources: Sources) -> tuple[StimulusRow, bytes]:
     """The only stimulus of a recipe and its WAV file; refused as by `write_wav`."""
     count = stimulus_count(recipe, sources)
     if count != 1:

@@ -21,7 +21,7 @@ COMPENSATED = "compensated"
 
 
 @dataclass(frozen=True)
-class Stimulus:
+class StimulusRow:
     """One rendered file: the manifest's row; `COLUMNS` says what each field is (None: n/a)."""
 
     file: str
@@ -73,7 +73,7 @@ def measured(vibration: Floats, rate_hz: float, *, written: Floats) -> dict[str,
     }
 
 
-def write_manifest(folder: Path, stimuli: Sequence[Stimulus]) -> None:
+def write_manifest(folder: Path, stimuli: Sequence[StimulusRow]) -> None:
     """Write `manifest.tsv`, and `manifest.json` with what each column means."""
     write_table(folder / MANIFEST, COLUMNS, map(vars, stimuli))
     meanings = {column.name: column.description for column in COLUMNS}

@@ -16,7 +16,7 @@ import tomlkit
 from modeling import InputError
 from modeling.checks import HIGHEST_FORCE_N, HIGHEST_SPEED_MM_S
 from modeling.errors import shown
-from modeling.files.described import DescribedFile, Section, key, keys_of, plain
+from modeling.files.described import DescribedFile, FileSection, key, keys_of, plain
 from modeling.files.kinds import Name
 from modeling.files.values import NameOrFile
 from modeling.recordings.trajectory import LONGEST_S
@@ -32,7 +32,7 @@ HIGHEST_SEED = 2**63 - 1
 
 
 @dataclass(frozen=True)
-class ModelEntry(Section):
+class ModelEntry(FileSection):
     """Models, by their place or from a scene; one of the two is given."""
 
     WHERE: ClassVar[str] = "[[model]]"
@@ -69,7 +69,7 @@ def _label(place: Path, *, of_scene: bool) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrajectoryEntry(Section):
+class TrajectoryEntry(FileSection):
     """A constant speed and force, or the file of a recorded hand."""
 
     WHERE: ClassVar[str] = "[[trajectory]]"
@@ -105,7 +105,7 @@ Decibels = Annotated[float, key(unit="dB", ge=-200, le=200, as_given=True)]  # b
 
 
 @dataclass(frozen=True, kw_only=True)
-class Level(Section):
+class SetLevel(FileSection):
     """How loud a set is, and what a full-scale 24-bit sample stands for."""
 
     WHERE: ClassVar[str] = "[level]"
@@ -221,7 +221,7 @@ class Recipe(DescribedFile):
         Annotated[Path, key("a vibrator that is to play the set: files are its drive signals")]
         | None
     ) = None
-    level: Annotated[Level, key("how loud")] = Level()
+    level: Annotated[SetLevel, key("how loud")] = SetLevel()
     models: Annotated[tuple[ModelEntry, ...], key("what is rendered", name="model")]
     trajectories: Annotated[tuple[TrajectoryEntry, ...], key("by which hand", name="trajectory")]
 
@@ -271,7 +271,7 @@ def _shown(value: object) -> str:
     return f"{value.place} ({value.label})" if isinstance(value, ModelEntry) else repr(value)
 
 
-def _section(heading: str, section: Section) -> str:
+def _section(heading: str, section: FileSection) -> str:
     values = {
         k.name: plain(getattr(section, k.field))
         for k in keys_of(type(section))

@@ -19,7 +19,7 @@ from modeling.files.writing import file_stem, write_text
 from modeling.models.loading import AnyModel, load_model, models_in
 from modeling.recordings.trajectory import Trajectory, load_trajectory
 from modeling.scenes.loading import scene_models
-from stimuli.sets.recipe import Level, ModelEntry, Recipe, TrajectoryEntry
+from stimuli.sets.recipe import ModelEntry, Recipe, SetLevel, TrajectoryEntry
 
 FOLDER = "sources"
 RECIPE = "recipe.toml"
@@ -210,7 +210,7 @@ def recipe_of_copies(recipe: Recipe, sources: Sources) -> tuple[Recipe, dict[Pat
     return copied, dict(copies)
 
 
-def _naming(level: Level, threshold: Path) -> Level:
+def _naming(level: SetLevel, threshold: Path) -> SetLevel:
     return replace(level, threshold=NameOrFile(threshold.as_posix()))
 
 

@@ -1,4 +1,4 @@
-"""Stimulus sets: WAV files rendered from a recipe, and the manifest that says what they are."""
+"""StimulusRow sets: WAV files rendered from a recipe, and the manifest that says what they are."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from modeling.threads import in_order, usable_cores
 from stimuli.sets.manifest import (
     COLUMNS_FILE,
     COMPENSATED,
-    Stimulus,
+    StimulusRow,
     level_db,
     measured,
     write_manifest,
@@ -104,7 +104,7 @@ def write_set(
     sources: Sources | None = None,
     progress: Callable[[str], None] | None = None,
     finish: Callable[[Path], None] | None = None,
-) -> tuple[Stimulus, ...]:
+) -> tuple[StimulusRow, ...]:
     """Render every model on every trajectory with every seed, at every rate, to a WAV file.
 
     Beside the files: `manifest.tsv` with `manifest.json`, which describes its columns, and
@@ -128,7 +128,7 @@ def write_set(
 
     Returns
     -------
-    tuple of Stimulus
+    tuple of StimulusRow
         The manifest's rows.
 
     Raises
@@ -197,7 +197,7 @@ def stimulus_count(recipe: Recipe, sources: Sources) -> int:
     return takes * len(recipe.rates_hz)
 
 
-def rendered(recipe: Recipe, sources: Sources) -> Generator[tuple[Stimulus, bytes]]:
+def rendered(recipe: Recipe, sources: Sources) -> Generator[tuple[StimulusRow, bytes]]:
     """Every stimulus of a recipe: its row of the manifest and its WAV file.
 
     Gains are found before the first, files rendered as they are asked for, by threads that keep a
@@ -290,7 +290,7 @@ class _FileMaker:
     sources: Sources
     recipe_sha256: str
 
-    def files(self, take: _Take, gain: _Gain) -> list[tuple[Stimulus, bytes]]:
+    def files(self, take: _Take, gain: _Gain) -> list[tuple[StimulusRow, bytes]]:
         """The files of one take, one per rate, each with its row of the manifest."""
         with_margins = take.render() * 10 ** (gain.gain_db / 20)
         resampled = partial(
@@ -310,7 +310,7 @@ class _FileMaker:
             file = self._file_name(take, rate_hz)
             _check_finite(written, file, self.recipe.format)
             data = wav_bytes(written, rate_hz, full_scale_g=self.recipe.level.full_scale_g)
-            stimulus = Stimulus(
+            stimulus = StimulusRow(
                 file=file,
                 rate_hz=rate_hz,
                 duration_s=vibration.size / rate_hz,
@@ -368,7 +368,7 @@ def _check_finite(samples: Floats, file: str, sample_format: SampleFormat) -> No
         )
 
 
-def check_clipping(stimuli: Sequence[Stimulus]) -> None:
+def check_clipping(stimuli: Sequence[StimulusRow]) -> None:
     """Refuse a set of 24-bit files of which one does not hold its samples."""
     loudest = max(stimuli, key=lambda stimulus: stimulus.peak)
     full_scale_g = loudest.full_scale_g

@@ -51,13 +51,13 @@ def feel(
     Example: tactileq feel models/canvas.json
     """
     from experiments.feel.textures import load_textures
-    from experiments.feel.view import Yardstick
+    from experiments.feel.view import FeltCriterion
     from experiments.feel.visit import Visit
     from experiments.feel.window import FeelWindow
     from modeling import Threshold
 
     textures = load_textures(models, simplified)
-    yardstick = Yardstick(
+    yardstick = FeltCriterion(
         threshold=Threshold.named(threshold), criterion=criterion, hold_above=hold_above
     )
     with (

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import typer
 
 from modeling.errors import counted
-from tactileq.many_textures import HowToModel, Outcome, model_textures
+from tactileq.many_textures import HowToModel, TextureOutcome, model_textures
 from tactileq.options import Out
 
 
@@ -60,7 +60,7 @@ def model(
     _require_all(model_textures(folders, out, how=how, jobs=jobs))
 
 
-def _require_all(outcomes: Sequence[Outcome]) -> None:
+def _require_all(outcomes: Sequence[TextureOutcome]) -> None:
     """Report each texture in order; at the end name those that could not be modelled."""
     failed = [outcome for outcome in outcomes if outcome.error]
     if len(outcomes) == len(failed) == 1:
@@ -75,7 +75,7 @@ def _require_all(outcomes: Sequence[Outcome]) -> None:
         )
 
 
-def _tell(outcome: Outcome) -> None:
+def _tell(outcome: TextureOutcome) -> None:
     for warning in outcome.warnings:
         print(warning, file=sys.stderr)
     for note in outcome.notes:

@@ -133,7 +133,7 @@ def power(
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class People:
+class SimulatedStudy:
     """A study with the simulated people who take part in it.
 
     Parameters
@@ -255,7 +255,7 @@ def people_of(
     *,
     threshold: str,
     planted: dict[str, dict[str, float]],
-) -> People:
+) -> SimulatedStudy:
     """Who takes part, with the planted textures as real surfaces.
 
     Raises
@@ -283,11 +283,13 @@ def people_of(
         threshold=Threshold.named(threshold),
     )
     require_plantable(perception, psychometrics)
-    return People(study=study, models=sets, perception=perception, psychometrics=psychometrics)
+    return SimulatedStudy(
+        study=study, models=sets, perception=perception, psychometrics=psychometrics
+    )
 
 
 def chances(
-    people: People,
+    people: SimulatedStudy,
     sizes: Sequence[int],
     *,
     simulations: int,
@@ -304,7 +306,7 @@ def chances(
 
     Parameters
     ----------
-    people : People
+    people : SimulatedStudy
     sizes : sequence of int
         Numbers of participants, none above those of the study.
     simulations : int
@@ -350,7 +352,7 @@ def chances(
 
 
 def simulated_verdicts(
-    people: People,
+    people: SimulatedStudy,
     sizes: Sequence[int],
     number: int,
     *,
@@ -376,7 +378,7 @@ def simulated_verdicts(
     return verdicts_by_size(by_size, rng=rng, effort=effort)
 
 
-def responses_of(people: People, rows: dict[str, list[Row]], *, n: int) -> Responses:
+def responses_of(people: SimulatedStudy, rows: dict[str, list[Row]], *, n: int) -> Responses:
     """The answers of the first n participants as if they had been loaded."""
     import pandas as pd
 
@@ -401,7 +403,7 @@ def responses_of(people: People, rows: dict[str, list[Row]], *, n: int) -> Respo
     )
 
 
-def _planned(people: People, *, n: int) -> dict[str, PlannedTask]:
+def _planned(people: SimulatedStudy, *, n: int) -> dict[str, PlannedTask]:
     from analysis.answers.responses import PlannedTask
     from experiments.tasks.durations import trials_of_session
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from modeling.models.grid import Condition
     from rig.capture.coverage import Coverage
-    from rig.capture.recorder import HandLately, Level, StrokeRecorder
+    from rig.capture.recorder import HandLately, InputLevel, StrokeRecorder
 
 # Okabe–Ito blue and orange; characters in each cell repeat what its colour means.
 FULL, PART, NEXT = "#56B4E9", "#E69F00", "bold reverse"
@@ -88,7 +88,7 @@ def hand_line(hand: HandLately, target: Condition | None, words: list[str]) -> T
     )
 
 
-def level_line(level: Level) -> Text:
+def level_line(level: InputLevel) -> Text:
     """The input: a bar of its level, peak, floor, and whether it clips."""
     from rich.text import Text
 
@@ -100,7 +100,7 @@ def level_line(level: Level) -> Text:
     return Text.assemble(text, (" CLIPPING" if level.clipping else "", "bold reverse"))
 
 
-def _meter(level: Level) -> str:
+def _meter(level: InputLevel) -> str:
     """A bar over the 60 dB below full scale: RMS `#`, peak `|`."""
 
     def place(value: float) -> int:

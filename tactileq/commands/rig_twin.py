@@ -31,11 +31,11 @@ def rig_twin(
     Example: tactileq rig twin --rig twin.toml
     """
     from rig.simulated.card import SimulatedCard
-    from rig.simulated.vibrator import SimulatedVibrator
+    from rig.simulated.vibrator import SimulatedTransducers
 
     if rig.exists():
         raise ValueError(f"expected a new rig file, got {rig}, which exists; choose another name.")
-    truth = SimulatedVibrator() if vibrator is None else SimulatedVibrator.load(vibrator)
+    truth = SimulatedTransducers() if vibrator is None else SimulatedTransducers.load(vibrator)
     with SimulatedCard(truth) as card:
         _write_rig_file(rig, card)
         print(

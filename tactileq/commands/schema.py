@@ -10,7 +10,7 @@ import typer
 from modeling.errors import InputError, shown
 
 if TYPE_CHECKING:
-    from modeling.files.described import Section
+    from modeling.files.described import FileSection
 
 # Each kind of file, and where it is declared.
 DECLARED = {
@@ -42,12 +42,12 @@ def schema(
     print(schema_text(declared(name)), end="")
 
 
-def declared(name: str) -> type[Section]:
+def declared(name: str) -> type[FileSection]:
     """The declaration of a kind of file; InputError for any other."""
     if name not in DECLARED:
         raise InputError(
             f"expected a kind of file among {', '.join(DECLARED)}, got {shown(name)}; choose one."
         )
     module, declaration = DECLARED[name].split(":")
-    found: type[Section] = getattr(import_module(module), declaration)
+    found: type[FileSection] = getattr(import_module(module), declaration)
     return found

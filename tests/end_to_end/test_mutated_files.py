@@ -46,12 +46,12 @@ from modeling.scenes.scene import HandRange
 from rig.capture.grid import StrokeGrid
 from rig.capture.pieces import PieceStore, Plan
 from rig.desk.parts import hand_settings
-from rig.hand.scripted import Trajectory
+from rig.hand.scripted import ScriptedTrajectory
 from rig.importing.files import import_csv, import_wav
 from rig.importing.hatt import load_hatt
 from rig.importing.labels import Label, labels_from_table
 from rig.setup.rig_file import SHIPPED_RIG_FILE, Figure, RigFile
-from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedVibrator
+from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
 from rig.sound.signals import stimuli_of_surfaces
 from stimuli.planted.textures import planted_texture
 from stimuli.planted.vibrators import planted_vibrator
@@ -180,7 +180,7 @@ def use_rig_file(path: Path) -> Iterable[object]:
 
 
 def use_simulated_vibrator(path: Path) -> Iterable[object]:
-    accelerometer = SimulatedAccelerometer(SimulatedVibrator.load(path), rate_hz=48_000.0)
+    accelerometer = SimulatedAccelerometer(SimulatedTransducers.load(path), rate_hz=48_000.0)
     yield accelerometer.give(NOISE[:80])
 
 
@@ -236,7 +236,7 @@ def use_trajectory(path: Path) -> Iterable[object]:
 
 
 def use_positions(path: Path) -> Iterable[object]:
-    script = Trajectory.load(path)
+    script = ScriptedTrajectory.load(path)
     yield [script.at(time_s) for time_s in (0.0, 0.3, 1e9)]
 
 

@@ -20,14 +20,14 @@ import pytest
 from modeling import ARModel, TextureModel
 from rig.setup.rig_file import RigFile
 from rig.simulated.card import DEVICE, SimulatedCard
-from rig.simulated.vibrator import SimulatedVibrator
+from rig.simulated.vibrator import SimulatedTransducers
 from stimuli.planted.textures import planted_texture
 from tests.modeling.rendering.lattices import planted_ar
 from tests.rig.calibration.card import rig_file
 
 Jack = Callable[..., AbstractContextManager[Any]]
 Run = Callable[..., subprocess.CompletedProcess[str]]
-TRUTH = SimulatedVibrator(height=1.001, g_per_fullscale=5.0, delay_s=0.004)
+TRUTH = SimulatedTransducers(height=1.001, g_per_fullscale=5.0, delay_s=0.004)
 DELAYED_MS = 4.0
 BUSY = re.compile(
     r"lost samples|no block for|no trace|got it .* ms before|in at least 50 trials|coherence"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from experiments.sessions.surfaces import Choice, Intake, Note, Rating, Standing, Surfaces
+from experiments.sessions.surfaces import Choice, Intake, Note, ProgressReport, Rating, Surfaces
 
 
 class Scripted:
@@ -62,7 +62,7 @@ class Ready:
     def __init__(self) -> None:
         self.trays: list[str] = []
         self.called: list[str] = []
-        self.told: list[Standing] = []
+        self.told: list[ProgressReport] = []
         self.answers = 0
 
     def ask_mount(self, tray: str) -> None:
@@ -77,7 +77,7 @@ class Ready:
     def ready(self) -> bool:
         return True
 
-    def tell(self, standing: Standing) -> None:
+    def tell(self, standing: ProgressReport) -> None:
         self.told.append(standing)
 
     def page(self, name: str) -> None:

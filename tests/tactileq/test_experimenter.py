@@ -11,7 +11,7 @@ from typing import TextIO
 import pytest
 from rich.console import Console
 
-from experiments.sessions.surfaces import SessionAborted, Standing
+from experiments.sessions.surfaces import ProgressReport, SessionAborted
 from tactileq.experimenter import Terminal
 from tests.refusals import refused
 from tests.rig.waiting import wait_until
@@ -67,7 +67,9 @@ def test_labels_and_sentences_are_shown_as_they_stand(desk: Desk) -> None:
     desk.terminal.ask_mount("[b2]")
     desk.terminal.call("expected a port, got [/dev/ttyACM0].")
     problem = "plug [/x] in."
-    desk.terminal.tell(Standing(phase="main", done=1, of=2, minutes_left=None, problems=(problem,)))
+    desk.terminal.tell(
+        ProgressReport(phase="main", done=1, of=2, minutes_left=None, problems=(problem,))
+    )
     assert "Tray [b2]:" in desk.shown
     assert "got [/dev/ttyACM0]." in desk.shown
     assert problem in desk.shown
@@ -138,15 +140,15 @@ def test_what_failed_is_told_and_confirmed(desk: Desk) -> None:
     ("standing", "shown"),
     [
         (
-            Standing(phase="training", done=0, of=14, minutes_left=None, problems=()),
+            ProgressReport(phase="training", done=0, of=14, minutes_left=None, problems=()),
             "training · rig: ready",
         ),
         (
-            Standing(phase="main", done=5, of=14, minutes_left=7.6, problems=()),
+            ProgressReport(phase="main", done=5, of=14, minutes_left=7.6, problems=()),
             "5 of 14 trials done · about 8 min left · rig: ready",
         ),
         (
-            Standing(
+            ProgressReport(
                 phase="main", done=13, of=14, minutes_left=0.2, problems=("no hand; plug it in.",)
             ),
             "13 of 14 trials done · about 1 min left · rig: no hand; plug it in.",
@@ -154,7 +156,7 @@ def test_what_failed_is_told_and_confirmed(desk: Desk) -> None:
     ],
 )
 def test_how_far_the_session_is_and_how_the_rig_is(
-    desk: Desk, standing: Standing, shown: str
+    desk: Desk, standing: ProgressReport, shown: str
 ) -> None:
     desk.terminal.tell(standing)
     assert desk.shown.strip() == shown

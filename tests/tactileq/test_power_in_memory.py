@@ -34,7 +34,7 @@ from modeling.files.claims import ClaimSection, PlanSection
 from rig.twin import SimulatedRig
 from stimuli.planted.textures import planted_texture
 from tactileq.commands.power import (
-    People,
+    SimulatedStudy,
     chances,
     people_of,
     planned_for,
@@ -87,7 +87,7 @@ def models() -> ModelSets:
     return ModelSets(sets={"full": truths, "simplified": fewer})
 
 
-def people(study: Study, models: ModelSets, *, most: int, points: float = 0.0) -> People:
+def people(study: Study, models: ModelSets, *, most: int, points: float = 0.0) -> SimulatedStudy:
     planted = planted_effects([f"magnitude_similarity={points:g}"], TEXTURES)
     return people_of(planned_for(study, [most]), models, threshold="codec", planted=planted)
 

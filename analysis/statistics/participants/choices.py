@@ -16,7 +16,7 @@ from modeling.participants.choices import (
     ChoicePriors,
     ChoiceStudies,
     DecisionModel,
-    People,
+    StudyPeople,
     mean_effect,
 )
 from modeling.participants.effects import COMPONENTS, EffectMixture, drawn_places
@@ -56,7 +56,7 @@ class ChoiceSampler:
         two = float(m == 2)
         self._level = np.full(b, priors.ability[0] * two)
         self._person_variance = np.full(b, priors.person_sd**2)
-        self._state = People(
+        self._state = StudyPeople(
             ability=np.full((b, n), priors.ability[0] * two),
             effect=np.zeros((b, n)),
             textures=np.zeros((b, t)),
@@ -95,7 +95,7 @@ class ChoiceSampler:
 
     # Likelihoods: of cells (B, n, T, M), of people (B, n), of studies (B,).
 
-    def _log_cells(self, state: People, lapses: Floats | None = None) -> Floats:
+    def _log_cells(self, state: StudyPeople, lapses: Floats | None = None) -> Floats:
         rate = (self.lapses if lapses is None else lapses)[:, None, None, None]
         p = self._model.share(state.d_prime(self._models, self._data.trends))
         p *= 1 - rate
@@ -318,7 +318,7 @@ class ChoiceSampler:
 
 def population_effects(
     model: DecisionModel,
-    state: People,
+    state: StudyPeople,
     mixture: EffectMixture,
     *,
     level: Floats,

@@ -14,7 +14,7 @@ from analysis.spectra.figures.stimuli import figure_contact_sheet, plot_stimuli
 from modeling import TextureModel
 from stimuli.planted.textures import planted_texture
 from stimuli.planted.vibrators import planted_vibrator
-from stimuli.sets.recipe import Level, ModelEntry, Recipe, TrajectoryEntry
+from stimuli.sets.recipe import ModelEntry, Recipe, SetLevel, TrajectoryEntry
 from stimuli.sets.writing import write_set
 
 GRID = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
@@ -76,7 +76,7 @@ def test_spectra_are_the_models(sheet: ContactSheet) -> None:
 def test_24_bit_files_have_the_same_spectra(tmp_path: Path) -> None:
     few = {"seeds": (1,), "rates_hz": (8000,), "duration_s": 0.3}
     write_set(tmp_path / "float", recipe_of(tmp_path, **few))
-    made = recipe_of(tmp_path, format="pcm24", level=Level(full_scale_g=2.0), **few)
+    made = recipe_of(tmp_path, format="pcm24", level=SetLevel(full_scale_g=2.0), **few)
     write_set(tmp_path / "pcm", made)
     a, b = (contact_sheet(tmp_path / name) for name in ("float", "pcm"))
     assert np.nanmax(np.abs(a.density_db - b.density_db)) < 0.01

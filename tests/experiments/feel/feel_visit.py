@@ -17,7 +17,7 @@ from experiments.feel import panels, window
 from experiments.feel.plots import LiveText
 from experiments.feel.rigs import HandNow, OutputNow
 from experiments.feel.textures import Texture
-from experiments.feel.view import Yardstick
+from experiments.feel.view import FeltCriterion
 from experiments.feel.visit import Visit
 from modeling import Threshold, simplify
 from stimuli.planted.textures import planted_texture
@@ -104,6 +104,6 @@ textures = [
     Texture(full=canvas, simplified=simplify(canvas, threshold, criterion="paper-fft").model)
 ]
 textures.append(Texture(full=leather))
-yardstick = Yardstick(threshold=threshold)
+yardstick = FeltCriterion(threshold=threshold)
 while order := sys.stdin.readline():
     visit_in(tuple(map(int, order.split())))

@@ -10,7 +10,7 @@ import pytest
 from experiments.feel.rigs import NO_HAND, HandNow, OutputNow
 from experiments.feel.textures import Texture
 from experiments.feel.view import (
-    Yardstick,
+    FeltCriterion,
     amplitude_range,
     felt_words,
     hand_words,
@@ -59,7 +59,7 @@ def test_levels_of_known_layers() -> None:
     gains = lone_layers((100.0, 0.2), (200.0, 0.1), (300.0, 0.05), (450.0, 0.05), (600.0, 0.2))
     k = np.tan(np.pi * 20 / 5000)
     model = replace(gains, gains=gains.gains * np.sqrt(2 * k / (1 + k)))
-    gain = Yardstick(threshold=FLAT, criterion="paper-gain")
+    gain = FeltCriterion(threshold=FLAT, criterion="paper-gain")
     layers = model_now(model, at(-60.0, 1.5), gain).layers
     assert layers.amplitude_g == pytest.approx([0.2, 0.1, 0.05, 0.05, 0.2])
     # Above the table's end a weak layer is not felt, and nothing is known of a strong one.
@@ -77,11 +77,11 @@ def test_the_change_of_power_by_a_lone_layer() -> None:
     """Its amplitude is that of the sinusoid of equal power; above the table nothing is known."""
     everywhere = replace(FLAT, frequency_hz=np.array([1e-6, 1e6]))
     now = at(60.0, 1.5)
-    layers = model_now(lone_layers((100.0, 0.2)), now, Yardstick(threshold=everywhere)).layers
+    layers = model_now(lone_layers((100.0, 0.2)), now, FeltCriterion(threshold=everywhere)).layers
     assert layers.amplitude_g == pytest.approx([0.2])
     assert layers.sensation_db == pytest.approx([20 * np.log10(2)], abs=1e-4)
     assert layers.felt.tolist() == [True]
-    layers = model_now(lone_layers((900.0, 0.2)), now, Yardstick(threshold=FLAT)).layers
+    layers = model_now(lone_layers((900.0, 0.2)), now, FeltCriterion(threshold=FLAT)).layers
     assert layers.unknown.tolist() == [True]
 
 
@@ -89,7 +89,7 @@ def test_the_change_of_power_by_a_lone_layer() -> None:
 @pytest.mark.parametrize("texture", ["canvas", "polyester", "PVC"])
 def test_what_is_felt_is_what_simplify_says_of_that_condition(texture: str, threshold: str) -> None:
     model, table = planted_texture(texture), Threshold.shipped(threshold)
-    yardstick = Yardstick(threshold=table)
+    yardstick = FeltCriterion(threshold=table)
     seen = set()
     for i, j in ((0, 0), (3, 2), (6, 6)):
         speed, force = float(model.speeds_mm_s[i]), float(model.forces_n[j])
@@ -130,7 +130,7 @@ def test_the_spectrum_is_the_response_that_is_rendered(kind: str) -> None:
     model: Layered = planted_texture("canvas")
     if kind == "regressed":
         model = regressed(model)
-    now = model_now(model, at(-120.0, 1.3), Yardstick(threshold=FLAT))
+    now = model_now(model, at(-120.0, 1.3), FeltCriterion(threshold=FLAT))
     peq = model.peq(120.0, 1.3)
     assert now.density == pytest.approx(peq.response(now.frequency_hz) * np.sqrt(2 / 5000))
     assert (np.diff(now.frequency_hz) >= 0).all()
@@ -159,7 +159,7 @@ def test_where_the_hand_is_on_the_grid() -> None:
 def test_a_hand_that_is_gone_feels_nothing() -> None:
     model = lone_layers((100.0, 0.2))
     gone = HandNow(speed_mm_s=60.0, force_n=1.5, there=False)
-    now = model_now(model, gone, Yardstick(threshold=FLAT))
+    now = model_now(model, gone, FeltCriterion(threshold=FLAT))
     assert now.rms_g == 0
     assert not now.layers.felt.any()
     assert level_words(float(now.layers.sensation_db[0])) == "silent"
@@ -169,7 +169,7 @@ def test_a_hand_that_is_gone_feels_nothing() -> None:
 @pytest.mark.parametrize("criterion", CRITERIA)
 def test_axes_hold_all_textures_and_do_not_move(criterion: CriterionName) -> None:
     threshold = Threshold.shipped("codec")
-    yardstick = Yardstick(threshold=threshold, criterion=criterion)
+    yardstick = FeltCriterion(threshold=threshold, criterion=criterion)
     textures = [Texture(full=planted_texture(name)) for name in CATALOGUE]
     low, high = spectrum_range(textures)
     assert high / low == pytest.approx(1000)
@@ -187,7 +187,7 @@ def test_axes_hold_all_textures_and_do_not_move(criterion: CriterionName) -> Non
 
 
 def test_words_say_what_is_assumed_and_what_does_not_play() -> None:
-    now = model_now(lone_layers((100.0, 0.2)), at(60.0, 1.5), Yardstick(threshold=FLAT))
+    now = model_now(lone_layers((100.0, 0.2)), at(60.0, 1.5), FeltCriterion(threshold=FLAT))
     assert hand_words(HandNow(speed_mm_s=-61.0, force_n=1.5, force_assumed=True)) == (
         "61 mm/s   1.5 N (assumed)"
     )

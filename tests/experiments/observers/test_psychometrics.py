@@ -14,8 +14,8 @@ from scipy import stats
 
 from experiments.observers.psychometrics import (
     EFFECTS,
-    Person,
     Psychometrics,
+    SimulatedPerson,
     Trait,
     choice_shares,
     with_effect,
@@ -61,7 +61,7 @@ def test_traits_end_at_three_standard_deviations() -> None:
     assert person.sensitivity == pytest.approx(1.9)
 
 
-def drawn(count: int, **of: Any) -> list[Person]:
+def drawn(count: int, **of: Any) -> list[SimulatedPerson]:
     population = Psychometrics(**of)
     return [population.draw(generator(3, subject)) for subject in range(count)]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from experiments.sessions.roster import Person, Roster
+from experiments.sessions.roster import Roster, RosterEntry
 
 
-def enrolled(roster: Roster, subject: int | None, participants: int, **kind: Any) -> Person:
+def enrolled(roster: Roster, subject: int | None, participants: int, **kind: Any) -> RosterEntry:
     with roster.enrolling(subject, participants, **kind) as person:
         return person

@@ -14,7 +14,7 @@ from experiments.study.task_plan import TaskPlan
 from modeling import InputError
 from modeling.files.answer_tables import ANSWER_TABLES, RESPONSE_TIME, answer_table
 from modeling.files.claims import ClaimSection, PlanSection
-from modeling.files.described import Section, key
+from modeling.files.described import FileSection, key
 from modeling.files.describing import key_tables, schema
 from tests.refusals import refused
 
@@ -131,7 +131,7 @@ class PaidStudy(Study):
     ("paid", "name", "most", "where"),
     [(PaidStudy, "deposit", 50, ""), (PaidPlan, "reward", 99, "[absolute]")],
 )
-def test_a_key_costs_one_line(paid: type[Section], name: str, most: int, where: str) -> None:
+def test_a_key_costs_one_line(paid: type[FileSection], name: str, most: int, where: str) -> None:
     """Reading, refusing, saving, the schema and the documentation follow from the declaration."""
     plain = Study.load().to_dict()
     values = plain if paid is PaidStudy else plain["absolute"]

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from modeling import InputError
 from modeling.errors import shown
-from modeling.files.described import BESIDE, DescribedFile, Section, key, keys_of
+from modeling.files.described import BESIDE, DescribedFile, FileSection, key, keys_of
 from modeling.files.describing import key_tables, schema
 from modeling.files.kinds import Name, TextureNames
 from modeling.files.values import NameOrFile
@@ -22,7 +22,7 @@ from tests.refusals import refused
 
 
 @dataclass(frozen=True, kw_only=True)
-class Part(Section):
+class Part(FileSection):
     """A part."""
 
     WHERE: ClassVar[str] = "[[part]]"
@@ -176,7 +176,7 @@ def test_a_key_costs_one_line() -> None:
 
 
 @dataclass(frozen=True)
-class Quantity(Section):
+class Quantity(FileSection):
     """A number with its unit."""
 
     QUANTITY: ClassVar[str] = "value"

@@ -16,7 +16,7 @@ from modeling.participants.choices import (
     ChoicePriors,
     DecisionModel,
     DrawnChoices,
-    People,
+    StudyPeople,
     drawn_choices,
     forced_choice,
     m_afc_share,
@@ -153,11 +153,11 @@ def test_doubled_priors_have_twice_the_sds_and_the_same_means(model: DecisionMod
         assert odds[1] == pytest.approx(2 * odds[0])
 
 
-# --- People and drawn studies -----------------------------------------------------------------
+# --- People of studies, and drawn studies --------------------------------------------------------
 
 
-def people(*, slopes: tuple[float, ...] = ()) -> People:
-    return People(
+def people(*, slopes: tuple[float, ...] = ()) -> StudyPeople:
+    return StudyPeople(
         ability=np.array([[1.0, 2.0]]),
         effect=np.array([[-0.4, 0.6]]),
         textures=np.array([[0.0, 0.5, -0.5]]),

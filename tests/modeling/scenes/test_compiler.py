@@ -24,7 +24,7 @@ from modeling.scenes.compiled import CompiledTexture
 from modeling.scenes.compiler import compile_scene
 from modeling.scenes.error_maps import ErrorMaps
 from modeling.scenes.limit_losses import clipped_loss_db
-from modeling.scenes.measures import Errors, Yardstick, errors_between
+from modeling.scenes.measures import ComparedBand, Errors, errors_between
 from modeling.scenes.places import places_of
 from modeling.scenes.scene import Actuator, Bound, Budget, HandRange, Scene
 from tests.refusals import refused
@@ -130,7 +130,7 @@ class Driven(NamedTuple):
     at_rest: Errors  # at the places that count
 
 
-def every_grid(felt: TextureModel, scene: Scene, yardstick: Yardstick) -> Iterator[Driven]:
+def every_grid(felt: TextureModel, scene: Scene, yardstick: ComparedBand) -> Iterator[Driven]:
     """Each choice of the table's speeds and forces that encloses the scene."""
     assert isinstance(scene.hand, HandRange)
     ends = scene.hand.speed_mm_s, scene.hand.force_n
@@ -156,7 +156,7 @@ def every_grid(felt: TextureModel, scene: Scene, yardstick: Yardstick) -> Iterat
         yield Driven(on_grid(felt, cut, values), errors)
 
 
-def every_regression(felt: TextureModel, scene: Scene, yardstick: Yardstick) -> Iterator[Driven]:
+def every_regression(felt: TextureModel, scene: Scene, yardstick: ComparedBand) -> Iterator[Driven]:
     places = places_of(felt, scene.hand)
     rows, columns = np.nonzero(places.counts)
     hand = places.speeds_mm_s[rows], places.forces_n[columns]
@@ -171,7 +171,7 @@ def every_regression(felt: TextureModel, scene: Scene, yardstick: Yardstick) -> 
 
 def cheapest_of_all(full: TextureModel, scene: Scene) -> tuple[Key, int]:
     """The least key of all candidates that keep the bound, and how many candidates there are."""
-    yardstick = Yardstick(
+    yardstick = ComparedBand(
         full.rate_hz, narrowest_hz=float(full.bandwidths_hz.min()), band_hz=scene.actuator.band_hz
     )
     intervals = {max(1, round(ms * full.rate_hz / 1000)) for ms in INTERVALS_MS} | {1}
@@ -489,7 +489,9 @@ def test_what_limits_take_counts_towards_the_level(
 
 def full_rms(full: TextureModel) -> float:
     """RMS at the fastest and strongest condition, over the frequencies that are judged."""
-    yardstick = Yardstick(full.rate_hz, narrowest_hz=float(full.bandwidths_hz.min()), band_hz=None)
+    yardstick = ComparedBand(
+        full.rate_hz, narrowest_hz=float(full.bandwidths_hz.min()), band_hz=None
+    )
     at = full.parameters([300.0], [3.0])
     return float(np.sqrt(yardstick.power(at)[0]))
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from modeling import InputError, TextureModel, similarity
 from modeling.models.parameter_table import Parameters
 from modeling.recordings.spectrum import smooth
-from modeling.scenes.measures import Errors, Yardstick, errors_between
+from modeling.scenes.measures import ComparedBand, Errors, errors_between
 from modeling.scenes.scene import Bound
 from tests.refusals import refused
 
@@ -20,7 +20,7 @@ ModelMaker = Callable[..., TextureModel]
 RATE_HZ = 5000.0
 
 
-def responses(yardstick: Yardstick, model: TextureModel) -> np.ndarray:
+def responses(yardstick: ComparedBand, model: TextureModel) -> np.ndarray:
     return np.array(
         [
             model.peq(speed, force).response(yardstick.frequency_hz)
@@ -41,7 +41,7 @@ def test_responses_are_those_of_the_equalizer(
     seed: int, rate_hz: float, varied_model: ModelMaker
 ) -> None:
     model = varied_model(seed, rate_hz=rate_hz)
-    yardstick = Yardstick(rate_hz, narrowest_hz=15.0, band_hz=None)
+    yardstick = ComparedBand(rate_hz, narrowest_hz=15.0, band_hz=None)
     found = yardstick.responses(nodes(model))
     assert found == pytest.approx(responses(yardstick, model), rel=1e-9, abs=1e-12)
 
@@ -52,7 +52,7 @@ def test_errors_are_those_of_similarity(
     seeds: tuple[int, int], band_hz: tuple[float, float] | None, varied_model: ModelMaker
 ) -> None:
     """GFC30 is read every 10 Hz: its angle to 3 %. Bands and level to rounding."""
-    yardstick = Yardstick(RATE_HZ, narrowest_hz=15.0, band_hz=band_hz)
+    yardstick = ComparedBand(RATE_HZ, narrowest_hz=15.0, band_hz=band_hz)
     a, b = (varied_model(seed) for seed in seeds)
     errors = errors_between(*(yardstick.features(nodes(model)) for model in (a, b)))
     frequency = yardstick.frequency_hz
@@ -75,7 +75,7 @@ def test_errors_are_those_of_similarity(
 def test_errors_add_up_as_distances_do(
     seeds: tuple[int, int, int], varied_model: ModelMaker
 ) -> None:
-    yardstick = Yardstick(RATE_HZ, narrowest_hz=15.0, band_hz=None)
+    yardstick = ComparedBand(RATE_HZ, narrowest_hz=15.0, band_hz=None)
     a, b, c = (yardstick.features(nodes(varied_model(seed))) for seed in seeds)
     direct, around = errors_between(a, c), errors_between(a, b) + errors_between(b, c)
     for error, bound in zip(direct, around, strict=True):
@@ -86,7 +86,7 @@ def test_errors_add_up_as_distances_do(
 
 def test_a_louder_response_differs_in_level_alone(varied_model: ModelMaker) -> None:
     at = nodes(varied_model(0))
-    yardstick = Yardstick(RATE_HZ, narrowest_hz=15.0, band_hz=None)
+    yardstick = ComparedBand(RATE_HZ, narrowest_hz=15.0, band_hz=None)
     louder = at._replace(noise_gain=2 * at.noise_gain, gains=2 * at.gains)
     errors = errors_between(yardstick.features(louder), yardstick.features(at))
     assert errors.angle == pytest.approx(np.zeros(9), abs=1e-7)
@@ -96,14 +96,14 @@ def test_a_louder_response_differs_in_level_alone(varied_model: ModelMaker) -> N
 
 def test_the_power_of_white_noise_is_that_of_its_band() -> None:
     white = Parameters(np.array([0.3]), *[np.zeros((1, 0))] * 3)
-    whole = Yardstick(RATE_HZ, narrowest_hz=50.0, band_hz=None)
+    whole = ComparedBand(RATE_HZ, narrowest_hz=50.0, band_hz=None)
     assert whole.power(white)[0] == pytest.approx(0.09 * 0.98, rel=0.01)
-    part = Yardstick(RATE_HZ, narrowest_hz=50.0, band_hz=(500.0, 1000.0))
+    part = ComparedBand(RATE_HZ, narrowest_hz=50.0, band_hz=(500.0, 1000.0))
     assert part.power(white)[0] == pytest.approx(0.09 * 0.2, rel=0.02)
 
 
 def test_silence_is_like_silence_and_unlike_all_else() -> None:
-    yardstick = Yardstick(RATE_HZ, narrowest_hz=50.0, band_hz=None)
+    yardstick = ComparedBand(RATE_HZ, narrowest_hz=50.0, band_hz=None)
     gains = np.array([0.0, 0.1])
     features = yardstick.features(Parameters(gains, *[np.zeros((2, 0))] * 3))
     silent, loud = features.at(np.array([0])), features.at(np.array([1]))
@@ -132,4 +132,4 @@ def test_a_band_without_anything_in_it_is_refused(band_hz: tuple[float, float]) 
         expected=["10…2450 Hz", "5000 Hz"],
         got=["band_hz", f"{max(band_hz[0], 10):g} to {min(band_hz[1], 2450):g} Hz"],
     ):
-        Yardstick(RATE_HZ, narrowest_hz=15.0, band_hz=band_hz)
+        ComparedBand(RATE_HZ, narrowest_hz=15.0, band_hz=band_hz)

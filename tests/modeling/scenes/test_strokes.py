@@ -13,7 +13,7 @@ import pytest
 from modeling import InputError, Renderer, TextureModel, fit_texture
 from modeling.recordings.trajectory import Trajectory
 from modeling.scenes.compiled import CompiledTexture
-from modeling.scenes.measures import Yardstick, errors_between
+from modeling.scenes.measures import ComparedBand, errors_between
 from modeling.scenes.places import ranges_of
 from modeling.scenes.scene import Actuator, HandRange, HandUse, Scene, distributed_hand
 from modeling.scenes.scene import recorded_hand as recorded
@@ -128,7 +128,7 @@ def test_the_worst_error_is_the_one_that_is_rendered(compiled_for: Any) -> None:
         samples = Renderer(model, update_samples=1).render(speed, force, samples=100_000)
         power = np.abs(np.fft.rfft(samples * np.hanning(samples.size))) ** 2
         records.append(power)
-    yardstick = Yardstick(5000.0, narrowest_hz=18.0, band_hz=None)
+    yardstick = ComparedBand(5000.0, narrowest_hz=18.0, band_hz=None)
     step = round(100_000 / 5000 * yardstick.frequency_hz[1])
     means = [np.sqrt(np.convolve(power, np.ones(step) / step, "same")[::step]) for power in records]
     ours, felt = (yardstick.features_of(m[None, : yardstick.frequency_hz.size]) for m in means)

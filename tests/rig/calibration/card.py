@@ -11,7 +11,7 @@ from modeling.arrays import Floats
 from modeling.vibrators.compensation import compensation_for
 from rig.capture.input import AudioInput, InputBlock, InputSettings
 from rig.setup.rig_file import RigFile
-from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedVibrator
+from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
 from rig.sound.output import Presented
 
 RATE_HZ = 8000.0
@@ -53,7 +53,9 @@ class CalculatedCard(AudioInput):
 
     running = True  # type: ignore[assignment]
 
-    def __init__(self, rig: RigFile, vibrator: SimulatedVibrator, *, lost_first: int = 0) -> None:
+    def __init__(
+        self, rig: RigFile, vibrator: SimulatedTransducers, *, lost_first: int = 0
+    ) -> None:
         super().__init__(InputSettings(10.0))
         self.rate_hz = RATE_HZ
         self._rig = rig

@@ -10,7 +10,7 @@ from modeling import InputError
 from modeling.arrays import Floats
 from rig.calibration.alignment import aligned
 from rig.calibration.signals import noise_signal
-from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedVibrator
+from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
 from tests.refusals import refused
 
 RATE_HZ = 12_000.0
@@ -60,7 +60,7 @@ def test_a_card_of_another_rate_is_followed() -> None:
 
 def test_a_resonance_moves_it_by_less_than_half_a_millisecond() -> None:
     played = noise()
-    accelerometer = SimulatedAccelerometer(SimulatedVibrator(delay_s=0.02), rate_hz=RATE_HZ)
+    accelerometer = SimulatedAccelerometer(SimulatedTransducers(delay_s=0.02), rate_hz=RATE_HZ)
     record = accelerometer.give(np.append(played, np.zeros(3000)))
     pair = aligned(played, record, played_rate_hz=RATE_HZ, rate_hz=RATE_HZ)
     assert abs(pair.delay_s - 0.02) < 5e-4

@@ -7,14 +7,14 @@ import pytest
 
 from modeling import InputError
 from rig.calibration.floor import no_contact_floor
-from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedVibrator
+from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
 from tests.refusals import refused
 
 RATE_HZ = 8000.0
 
 
 def at_rest(duration_s: float = 5.0, **values: float) -> np.ndarray:
-    vibrator = SimulatedVibrator(**values)  # type: ignore[arg-type]
+    vibrator = SimulatedTransducers(**values)  # type: ignore[arg-type]
     accelerometer = SimulatedAccelerometer(vibrator, rate_hz=RATE_HZ)
     return 10.0 * accelerometer.give(np.zeros(round(duration_s * RATE_HZ)))
 

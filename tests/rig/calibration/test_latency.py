@@ -15,7 +15,7 @@ from rig.calibration.latency import (
     summary_of,
 )
 from rig.live.memory import BLOCK
-from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedVibrator
+from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
 from tests.refusals import refused
 
 RATE_HZ = 48_000.0
@@ -30,7 +30,7 @@ def onset_errors(*, times_louder: float, resonance: bool) -> np.ndarray:
         drive = np.concatenate([np.zeros(2400 + start), rng.standard_normal(4800 - start)])
         vibration = 0.01 * times_louder * drive
         if resonance:
-            vibrator = SimulatedVibrator(noise_g=0.0, g_per_fullscale=1.0, seed=seed)
+            vibrator = SimulatedTransducers(noise_g=0.0, g_per_fullscale=1.0, seed=seed)
             vibration = 10.0 * SimulatedAccelerometer(vibrator, rate_hz=RATE_HZ).give(vibration)
         samples = high_passed(vibration + 0.01 * rng.standard_normal(7200), rate_hz=RATE_HZ)
         found = onset_s(samples[:2400], samples[2400:], rate_hz=RATE_HZ)

@@ -30,12 +30,12 @@ from rig.calibration.trials import checked_loop_back_s, loop_back_s
 from rig.hand.pressure import fit_pressure
 from rig.live.memory import Live
 from rig.setup.rig_file import RigFile
-from rig.simulated.vibrator import SimulatedVibrator
+from rig.simulated.vibrator import SimulatedTransducers
 from tests.refusals import refused
 from tests.rig.calibration.card import RATE_HZ, CalculatedCard, rig_file
 
 TODAY = datetime.date(2026, 11, 22)
-TRUTH = SimulatedVibrator(frequency_hz=150.0, bandwidth_hz=40.0, height=3.0, g_per_fullscale=5.0)
+TRUTH = SimulatedTransducers(frequency_hz=150.0, bandwidth_hz=40.0, height=3.0, g_per_fullscale=5.0)
 
 
 @pytest.fixture(autouse=True)
@@ -77,7 +77,7 @@ def test_the_level_of_the_flat_part_is_found_and_written(tmp_path: Path) -> None
 
 def test_once_calibrated_the_gain_is_one(tmp_path: Path) -> None:
     rig = rig_file(tmp_path)
-    flat = SimulatedVibrator(height=1.0001, g_per_fullscale=8.0)
+    flat = SimulatedTransducers(height=1.0001, g_per_fullscale=8.0)
     card = CalculatedCard(rig, flat)
     found = measure_gain(rig, card, Accelerometer(card), rms_g=0.3)
     np.testing.assert_allclose(found.gain, 1.0, rtol=5e-3)
@@ -85,7 +85,7 @@ def test_once_calibrated_the_gain_is_one(tmp_path: Path) -> None:
 
 def test_what_would_be_too_strong_is_noticed_at_a_tenth(tmp_path: Path) -> None:
     rig = rig_file(tmp_path)
-    card = CalculatedCard(rig, SimulatedVibrator(g_per_fullscale=100.0))
+    card = CalculatedCard(rig, SimulatedTransducers(g_per_fullscale=100.0))
     with refused(InputError, expected="3 g", got=["18.1 g", "--level"]):
         check_softly(rig, card, Accelerometer(card), rms_g=0.3, band_hz=(100, 500))
     (played,) = card.played
@@ -104,11 +104,11 @@ def test_lost_samples_are_played_again(tmp_path: Path) -> None:
 
 def test_clipping_and_noise_are_refused(tmp_path: Path) -> None:
     rig = rig_file(tmp_path)
-    clipping = SimulatedVibrator(g_per_fullscale=5.0, sensor_fullscale_g=0.1)
+    clipping = SimulatedTransducers(g_per_fullscale=5.0, sensor_fullscale_g=0.1)
     card = CalculatedCard(rig, clipping)
     with refused(InputError, expected=["1%", "clipped"], got="71.6%"):
         measure_gain(rig, card, Accelerometer(card), rms_g=0.3)
-    noisy = SimulatedVibrator(g_per_fullscale=5.0, noise_g=3.0, sensor_fullscale_g=100.0)
+    noisy = SimulatedTransducers(g_per_fullscale=5.0, noise_g=3.0, sensor_fullscale_g=100.0)
     card = CalculatedCard(rig, noisy)
     with refused(InputError, expected=["coherence", 0.8], got=0.08):
         measure_gain(rig, card, Accelerometer(card), rms_g=0.3)
@@ -131,7 +131,7 @@ def test_a_silent_device_is_refused(tmp_path: Path) -> None:
 
 def test_floor_and_loop_back_are_as_planted(tmp_path: Path) -> None:
     rig = rig_file(tmp_path)
-    card = CalculatedCard(rig, SimulatedVibrator(noise_g=0.01, hum_g=0.02, delay_s=0.012))
+    card = CalculatedCard(rig, SimulatedTransducers(noise_g=0.01, hum_g=0.02, delay_s=0.012))
     accelerometer = Accelerometer(card)
     card.rest(4.0)
     record = accelerometer.take()
@@ -154,7 +154,7 @@ def test_the_loop_back_counts_from_the_first_sample_that_left(tmp_path: Path) ->
             super().play_signal(samples_g, compensated=compensated, wait=wait)
             return type("Left", (), {"time_s": left_s})()
 
-    card = Clocked(rig, SimulatedVibrator(delay_s=0.012))
+    card = Clocked(rig, SimulatedTransducers(delay_s=0.012))
     delay_s = loop_back_s(card, Accelerometer(card), rate_hz=RATE_HZ, rms_g=0.3)
     assert abs(delay_s - 0.012) < 3e-4
     assert checked_loop_back_s(-5e-4) == -5e-4

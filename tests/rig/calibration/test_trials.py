@@ -19,7 +19,7 @@ from rig.calibration.trials import (
     stroke_latencies_s,
     write_steps,
 )
-from rig.hand.scripted import Trajectory
+from rig.hand.scripted import ScriptedTrajectory
 from rig.live.memory import BLOCK, READING
 from tests.refusals import refused
 
@@ -36,7 +36,7 @@ def rows_of(times_s: np.ndarray, x_mm: np.ndarray, speed: np.ndarray) -> np.ndar
 def stepping(tmp_path: Path, *, delay_s: float, start_s: float = 50.0) -> Watched:
     """A scripted hand, and white noise that follows it late."""
     seconds = write_steps(tmp_path / "steps.tsv", 50, seed=1)
-    script = Trajectory.load(tmp_path / "steps.tsv")
+    script = ScriptedTrajectory.load(tmp_path / "steps.tsv")
     times = np.arange(0, seconds, 0.001)
     x_mm = np.array([script.at(float(time))[0] for time in times])
     samples = np.arange(0, seconds, 1 / RATE_HZ)

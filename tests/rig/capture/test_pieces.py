@@ -21,7 +21,7 @@ from scipy.io import wavfile
 from modeling import InputError, Recording, RecordingSet
 from modeling.files.locks import Lock
 from modeling.files.places import locked
-from rig.capture.cutting import Piece
+from rig.capture.cutting import StrokePart
 from rig.capture.grid import StrokeGrid
 from rig.capture.joining import joined
 from rig.capture.pieces import PieceStore, Plan
@@ -35,7 +35,7 @@ def plan(**changes) -> Plan:
     return Plan(**{"texture": "oak", "grid": GRID, "rate_hz": RATE_HZ, "wanted_s": 0.5} | changes)
 
 
-def piece(seconds: float = 0.2, *, speed: float = 80.0, seed: int = 0, **changes) -> Piece:
+def piece(seconds: float = 0.2, *, speed: float = 80.0, seed: int = 0, **changes) -> StrokePart:
     samples = np.random.default_rng(seed).normal(size=round(seconds * RATE_HZ))
     values = {
         "clipped": False,
@@ -43,7 +43,7 @@ def piece(seconds: float = 0.2, *, speed: float = 80.0, seed: int = 0, **changes
         "simulated": False,
         "force_assumed": False,
     } | changes
-    return Piece((speed, 0.6), samples, 1.0, speed + 1, 2.0, 0.61, 0.02, **values)
+    return StrokePart((speed, 0.6), samples, 1.0, speed + 1, 2.0, 0.61, 0.02, **values)
 
 
 def test_a_condition_is_recorded_once_its_pieces_suffice(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from rig.capture.input import InputBlock
 from rig.desk.desk_rig import DeskRig
 from rig.desk.pen_process import PenLog
 from rig.simulated.card import DEVICE, SimulatedCard
-from rig.simulated.vibrator import SimulatedVibrator
+from rig.simulated.vibrator import SimulatedTransducers
 from stimuli.planted.textures import planted_texture
 from tests.rig.desk.rig_files import rig_file
 
@@ -28,7 +28,7 @@ g_per_fullscale = {{ value = 50.0, unit = "g", assumed = false, source = "as sim
 
 
 def test_the_pen_feels_what_was_presented(jack_server: Jack, tmp_path: Path) -> None:
-    vibrator = SimulatedVibrator(
+    vibrator = SimulatedTransducers(
         height=1.001, g_per_fullscale=20.0, sensor_fullscale_g=50.0, noise_g=1e-4
     )
     model = planted_texture("PVC")

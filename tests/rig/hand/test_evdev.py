@@ -40,7 +40,7 @@ from rig.hand.events import (
 )
 from rig.hand.following import Follower
 from rig.hand.loop import HandLoop
-from rig.hand.messages import Counts, Fault, Firmware
+from rig.hand.messages import Counts, Firmware, HandFault
 from rig.hand.settings import HandSettings
 from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, Live, now_s
 
@@ -217,7 +217,7 @@ def test_unplugged_it_is_gone_at_once_and_taken_up_again(
 ) -> None:
     monkeypatch.setattr("rig.hand.loop.AGAIN_S", 0.05)
     desk.connect(3, "Small Tablet Pen", TABLET)
-    told: list[Fault | Counts | Firmware] = []
+    told: list[HandFault | Counts | Firmware] = []
     named = HandSettings(kind="tablet", device="Small Tablet Pen", pressure_points=POINTS)
     loop = HandLoop(live, named, tell=told.append)
     loop.open()
@@ -229,8 +229,8 @@ def test_unplugged_it_is_gone_at_once_and_taken_up_again(
     assert latest is not None
     assert latest["flags"] == GONE
     (desk.dev / "event3").rename(desk.dev / "gone")
-    assert [what for what in told if isinstance(what, Fault)] == [
-        Fault("Small Tablet Pen was unplugged.")
+    assert [what for what in told if isinstance(what, HandFault)] == [
+        HandFault("Small Tablet Pen was unplugged.")
     ]
     # Plugged in again it has another number, and the same name.
     (desk.sysfs / "event3").rename(desk.sysfs / "gone")

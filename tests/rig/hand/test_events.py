@@ -29,7 +29,7 @@ from rig.hand.events import (
     REL_Y,
     SYN_DROPPED,
     SYN_REPORT,
-    Axis,
+    AbsoluteAxis,
     Event,
     Frame,
     FrameReader,
@@ -122,9 +122,9 @@ def test_any_bytes_in_any_pieces_give_the_same_frames(stream: bytes, data: st.Da
 
 def pen(*, curve: PressureCurve | None = None, pressure: bool = True) -> PenHand:
     """1000 counts from −100 up at 10 per mm; the pen is out of reach."""
-    axes = {ABS_X: Axis(-100, 900, 10.0), ABS_Y: Axis(0, 500, 20.0)}
+    axes = {ABS_X: AbsoluteAxis(-100, 900, 10.0), ABS_Y: AbsoluteAxis(0, 500, 20.0)}
     if pressure:
-        axes[ABS_PRESSURE] = Axis(0, 2000)
+        axes[ABS_PRESSURE] = AbsoluteAxis(0, 2000)
     curve = curve or PressureCurve(((0.0, 0.0), (0.5, 1.0), (1.0, 4.0)))
     keys = (BTN_TOOL_PEN, BTN_TOOL_RUBBER, BTN_TOUCH, BTN_STYLUS)
     return PenHand(axes, curve, state={(EV_KEY, key): 0 for key in keys})
@@ -154,7 +154,7 @@ def test_the_rubber_end_is_in_reach_too() -> None:
 
 def test_without_a_curve_or_pressure_force_is_not_measured() -> None:
     assert pen(pressure=False).sample(frame()).force_n is None
-    hand = PenHand({ABS_X: Axis(0, 9, 1), ABS_Y: Axis(0, 9, 1)}, None, state={})
+    hand = PenHand({ABS_X: AbsoluteAxis(0, 9, 1), ABS_Y: AbsoluteAxis(0, 9, 1)}, None, state={})
     touching = hand.sample(frame((EV_ABS, ABS_X, 3), (EV_ABS, ABS_Y, 4), (EV_KEY, BTN_TOUCH, 1)))
     # A tablet that names no tool among its keys has its pen always in reach.
     assert touching[1:] == (3.0, 4.0, None, None, True, False)
@@ -177,4 +177,4 @@ def test_a_mouse_sums_its_counts() -> None:
 
 @pytest.mark.parametrize(("value", "share"), [(0, 0.0), (500, 0.5), (1000, 1.0)])
 def test_a_share_of_the_range(value: int, share: float) -> None:
-    assert Axis(0, 1000).share(value) == share
+    assert AbsoluteAxis(0, 1000).share(value) == share

@@ -22,7 +22,7 @@ from rig.hand.reader import HandReader
 from rig.hand.sample import Sample
 from rig.hand.scripted import COLUMNS
 from rig.hand.settings import HandSettings
-from rig.hand.window import Pointer
+from rig.hand.window import PointerDevice
 from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, SIMULATED, Live, now_s
 from rig.sound.messages import Silence
 from tests.refusals import refused
@@ -297,7 +297,7 @@ def test_a_window_pushes_pixels_and_force_is_assumed(live: Live) -> None:
 
 def test_two_missed_frames_of_a_window_change_no_speed() -> None:
     settings = HandSettings(kind="window", counts_per_mm=4.0, assumed_force_n=1.0)
-    follower = Follower(settings, rest_s=Pointer.rest_s)
+    follower = Follower(settings, rest_s=PointerDevice.rest_s)
     for frame in (*range(20), *range(22, 40)):
         follower.update(Sample(frame / 60, 100 * frame / 60, 0.0))
         if frame > 2:

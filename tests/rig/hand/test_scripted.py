@@ -10,7 +10,7 @@ import pytest
 from modeling import InputError
 from modeling.files.columns import names
 from modeling.files.tables import write_table
-from rig.hand.scripted import COLUMNS, ScriptedHand, Steady, Strokes, Trajectory, script_of
+from rig.hand.scripted import COLUMNS, ScriptedHand, ScriptedTrajectory, Steady, Strokes, script_of
 from rig.hand.settings import HandSettings
 from tests.refusals import refused
 
@@ -43,7 +43,7 @@ def test_a_table_is_played_once_and_lifted(tmp_path: Path) -> None:
 
 def test_arrays_are_played_as_a_table() -> None:
     time_s = np.array([0.0, 1.0])
-    script = Trajectory(time_s, 10 * time_s, y_mm=0 * time_s, force_n=1 + time_s)
+    script = ScriptedTrajectory(time_s, 10 * time_s, y_mm=0 * time_s, force_n=1 + time_s)
     assert script.at(0.5) == (5.0, 0.0, 1.5)
     hand = ScriptedHand(script)
     samples = hand.read()
@@ -65,4 +65,4 @@ def test_a_trajectory_of_times_that_do_not_rise_is_refused(
 ) -> None:
     time_s = np.array(times)
     with refused(InputError, names="trajectory", expected=expected, got=got):
-        Trajectory(time_s, time_s, y_mm=time_s, force_n=time_s)
+        ScriptedTrajectory(time_s, time_s, y_mm=time_s, force_n=time_s)

@@ -21,7 +21,7 @@ from rig.hand.settings import HandSettings
 from rig.live.messages import Message, Refused, decoded, received, send
 from rig.monitoring import bare_thread  # noqa: F401 (its messages)
 from rig.simulated import process  # noqa: F401
-from rig.simulated.vibrator import SimulatedVibrator
+from rig.simulated.vibrator import SimulatedTransducers
 from rig.sound import messages as sound
 from tests.refusals import refused
 
@@ -39,7 +39,7 @@ MADE: dict[Any, st.SearchStrategy[Any]] = {
             HandSettings(kind="scripted", script="hold", speed_mm_s=-80.0),
         ]
     ),
-    SimulatedVibrator: st.builds(SimulatedVibrator, seed=st.integers(0, 100)),
+    SimulatedTransducers: st.builds(SimulatedTransducers, seed=st.integers(0, 100)),
     RenderCounters: st.builds(RenderCounters),
     float: st.floats(allow_nan=False),
     int: st.integers(0, 2**64 - 1),  # keys of noise have 64 bits

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from modeling import InputError, identify_vibrator
-from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedVibrator
+from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
 from tests.refusals import refused
 
 RATE_HZ = 8000.0
 
 
-def quiet(**values: float) -> SimulatedVibrator:
-    return SimulatedVibrator(noise_g=0.0, **values)  # type: ignore[arg-type]
+def quiet(**values: float) -> SimulatedTransducers:
+    return SimulatedTransducers(noise_g=0.0, **values)  # type: ignore[arg-type]
 
 
 def test_an_impulse_has_the_stated_response() -> None:
@@ -33,7 +33,7 @@ def test_an_impulse_has_the_stated_response() -> None:
 
 @pytest.mark.parametrize("block", [1, 7, 128])
 def test_blocks_of_any_size_give_one_signal(block: int) -> None:
-    vibrator = SimulatedVibrator(delay_s=0.01, hum_g=0.02)
+    vibrator = SimulatedTransducers(delay_s=0.01, hum_g=0.02)
     played = np.random.default_rng(1).standard_normal(1000) * 0.1
     whole = SimulatedAccelerometer(vibrator, rate_hz=RATE_HZ).give(played)
     split = SimulatedAccelerometer(vibrator, rate_hz=RATE_HZ)
@@ -47,13 +47,13 @@ def test_delay_clipping_and_noise_are_as_planted() -> None:
     assert np.flatnonzero(delayed)[0] == 400
     clipped = SimulatedAccelerometer(quiet(sensor_fullscale_g=1.0), rate_hz=RATE_HZ).give(played)
     assert clipped.max() == 1.0
-    noise = SimulatedAccelerometer(SimulatedVibrator(noise_g=0.2), rate_hz=RATE_HZ)
+    noise = SimulatedAccelerometer(SimulatedTransducers(noise_g=0.2), rate_hz=RATE_HZ)
     rest = 10.0 * noise.give(np.zeros(40_000))
     np.testing.assert_allclose(rest.std(), 0.2, rtol=0.02)
 
 
 def test_it_is_identified_as_what_it_is() -> None:
-    vibrator = SimulatedVibrator(frequency_hz=150.0, bandwidth_hz=40.0, height=3.0)
+    vibrator = SimulatedTransducers(frequency_hz=150.0, bandwidth_hz=40.0, height=3.0)
     drive = 0.1 * np.random.default_rng(2).standard_normal(10 * 8000)
     measured = SimulatedAccelerometer(vibrator, rate_hz=RATE_HZ).give(drive)
     found = identify_vibrator(drive, 10.0 * measured, rate_hz=RATE_HZ, simulated=True)
@@ -66,10 +66,10 @@ def test_it_is_identified_as_what_it_is() -> None:
 def test_a_file_says_what_it_is(tmp_path: Path) -> None:
     file = tmp_path / "vibrator.toml"
     file.write_text("frequency_hz = 90.0\nhum_g = 0.01\n")
-    assert SimulatedVibrator.load(file) == SimulatedVibrator(frequency_hz=90.0, hum_g=0.01)
+    assert SimulatedTransducers.load(file) == SimulatedTransducers(frequency_hz=90.0, hum_g=0.01)
     file.write_text("frequency = 90.0\n")
     with pytest.raises(InputError, match="expected only frequency_hz, .*, got frequency"):
-        SimulatedVibrator.load(file)
+        SimulatedTransducers.load(file)
 
 
 @pytest.mark.parametrize(
@@ -88,9 +88,9 @@ def test_values_out_of_range_are_refused(
     values: dict[str, Any], expected: object, got: object
 ) -> None:
     with refused(InputError, expected=expected, got=got):
-        SimulatedVibrator(**values)
+        SimulatedTransducers(**values)
 
 
 def test_a_resonance_beyond_the_rate_is_refused() -> None:
     with refused(InputError, expected=["frequency", "1…3920 Hz", "8000 Hz"], got=5000):
-        SimulatedAccelerometer(SimulatedVibrator(frequency_hz=5000.0), rate_hz=8000.0)
+        SimulatedAccelerometer(SimulatedTransducers(frequency_hz=5000.0), rate_hz=8000.0)

@@ -16,7 +16,7 @@ from scipy.signal import iirpeak, lfilter
 
 from modeling import InputError, TextureModel, Threshold, Vibrator
 from stimuli.exports.peq_json import write_peq_json
-from stimuli.sets.recipe import Level, ModelEntry, Recipe
+from stimuli.sets.recipe import ModelEntry, Recipe, SetLevel
 from stimuli.sets.sources import load_sources
 from stimuli.sets.writing import write_set
 from tests.refusals import refused
@@ -92,7 +92,7 @@ def test_levels_are_matched_at_the_hand(
     tmp_path: Path, recipe: MakeRecipe, pen: Path, mode: str
 ) -> None:
     wanted = {"rms": {"rms_db": -20.0}, "loudness": {"sensation_level_db": 20.0}}[mode]
-    level = Level(mode=mode, **wanted)  # type: ignore[arg-type]
+    level = SetLevel(mode=mode, **wanted)  # type: ignore[arg-type]
     plain, driven = (
         write_set(tmp_path / name, recipe(level=level, vibrator=file))
         for name, file in (("plain", None), ("driven", pen))
@@ -106,13 +106,13 @@ def test_levels_are_matched_at_the_hand(
 
 def test_the_full_scale_is_that_of_the_drive(tmp_path: Path, recipe: MakeRecipe, pen: Path) -> None:
     """A set that fits only because its resonance is taken away is written."""
-    wide = {"format": "pcm24", "level": Level(full_scale_g=4.0)}
+    wide = {"format": "pcm24", "level": SetLevel(full_scale_g=4.0)}
     peaks = {
         name: max(s.peak for s in write_set(tmp_path / name, recipe(vibrator=file, **wide)))
         for name, file in (("plain", None), ("driven", pen))
     }
     assert peaks["driven"] < 0.98 * peaks["plain"]
-    tight = {"format": "pcm24", "level": Level(full_scale_g=1.01 * peaks["driven"])}
+    tight = {"format": "pcm24", "level": SetLevel(full_scale_g=1.01 * peaks["driven"])}
     write_set(tmp_path / "tight", recipe(vibrator=pen, **tight))
     with refused(
         InputError,

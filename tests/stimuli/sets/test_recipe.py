@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from modeling import InputError, Vibrator
 from stimuli.planted.textures import planted_texture
-from stimuli.sets.recipe import Level, ModelEntry, Recipe, TrajectoryEntry
+from stimuli.sets.recipe import ModelEntry, Recipe, SetLevel, TrajectoryEntry
 from stimuli.sets.sources import load_sources
 from tests.refusals import refused
 
@@ -49,7 +49,7 @@ def test_what_is_left_out_has_the_documented_values(tmp_path: Path) -> None:
         noise="independent",
         duration_s=1.0,
         settling_s=0.5,
-        level=Level(mode="as modelled"),
+        level=SetLevel(mode="as modelled"),
     )
 
 
@@ -59,7 +59,7 @@ def test_the_recipe_of_the_docs() -> None:
         (ROOT / "docs/../demo" / folder, label)
         for folder, label in (("models", "full"), ("simplified", "simplified"))
     ]
-    assert recipe.level == Level(mode="loudness", threshold="pen-hold", full_scale_g=2.0)
+    assert recipe.level == SetLevel(mode="loudness", threshold="pen-hold", full_scale_g=2.0)
     assert (recipe.rates_hz, recipe.seeds, recipe.format) == ((5000, 48_000), (1, 2), "pcm24")
 
 
@@ -84,10 +84,12 @@ numbers = st.floats(0, 1e4, allow_subnormal=False)
 constants = st.builds(TrajectoryEntry, name=names, speed_mm_s=numbers, force_n=numbers)
 hands = st.builds(TrajectoryEntry, name=names, file=paths)
 levels = st.one_of(
-    st.just(Level(full_scale_g=2.5)),
-    st.builds(Level, mode=st.just("rms"), rms_db=st.floats(-100, 100), full_scale_g=st.just(1.0)),
+    st.just(SetLevel(full_scale_g=2.5)),
     st.builds(
-        Level,
+        SetLevel, mode=st.just("rms"), rms_db=st.floats(-100, 100), full_scale_g=st.just(1.0)
+    ),
+    st.builds(
+        SetLevel,
         mode=st.just("loudness"),
         threshold=st.just("pen-hold") | st.text().map(lambda name: f"{name}x.tsv"),
         sensation_level_db=st.none() | st.floats(-50, 100),

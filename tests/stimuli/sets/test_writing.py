@@ -1,4 +1,4 @@
-"""Stimulus sets: the files, and a manifest that tells the truth about them."""
+"""StimulusRow sets: the files, and a manifest that tells the truth about them."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from modeling.files.stimulus_table import COLUMNS
 from modeling.perception.sensation_level import sensation_level
 from stimuli.planted.textures import planted_texture, record_texture
 from stimuli.sets import writing
-from stimuli.sets.manifest import Stimulus
-from stimuli.sets.recipe import Level, ModelEntry, Recipe, TrajectoryEntry
+from stimuli.sets.manifest import StimulusRow
+from stimuli.sets.recipe import ModelEntry, Recipe, SetLevel, TrajectoryEntry
 from stimuli.sets.rendering import fade_samples
 from stimuli.sets.writing import write_set
 from tests.refusals import refused
@@ -70,8 +70,8 @@ def test_every_model_trajectory_seed_and_rate_has_its_file(
     assert {p.name for p in (tmp_path / "set").iterdir()} == {*seen, *others}
 
 
-@pytest.mark.parametrize("level", [Level(), Level(full_scale_g=2.0)])
-def test_manifest_tells_the_truth(tmp_path: Path, recipe: MakeRecipe, level: Level) -> None:
+@pytest.mark.parametrize("level", [SetLevel(), SetLevel(full_scale_g=2.0)])
+def test_manifest_tells_the_truth(tmp_path: Path, recipe: MakeRecipe, level: SetLevel) -> None:
     sample_format = "pcm24" if level.full_scale_g else "float32"
     write_set(tmp_path / "set", recipe(level=level, format=sample_format))
     scale = level.full_scale_g or 1.0
@@ -106,7 +106,7 @@ def test_every_column_is_described(tmp_path: Path, recipe: MakeRecipe) -> None:
         == list(manifest(tmp_path / "set")[0])
         == [column.name for column in COLUMNS]
     )
-    assert list(Stimulus.__dataclass_fields__) == [column.name for column in COLUMNS]
+    assert list(StimulusRow.__dataclass_fields__) == [column.name for column in COLUMNS]
 
 
 def test_samples_are_g(tmp_path: Path, recipe: MakeRecipe, truth: TextureModel) -> None:
@@ -132,7 +132,7 @@ def test_set_is_reproducible_to_the_bit_from_its_own_recipe(
         trajectories=trajectories,
         rates_hz=(5000, 44_100),
         format="pcm24",
-        level=Level(mode="loudness", threshold=threshold, full_scale_g=4.0),
+        level=SetLevel(mode="loudness", threshold=threshold, full_scale_g=4.0),
     )
     write_set(tmp_path / "a", made)
     write_set(tmp_path / "b", made)
@@ -158,8 +158,8 @@ def test_set_is_reproducible_to_the_bit_from_its_own_recipe(
 
 LEVELS = {
     "as modelled": {},
-    "rms": {"level": Level(mode="rms", rms_db=-20.0)},
-    "loudness": {"level": Level(mode="loudness", full_scale_g=4.0), "format": "pcm24"},
+    "rms": {"level": SetLevel(mode="rms", rms_db=-20.0)},
+    "loudness": {"level": SetLevel(mode="loudness", full_scale_g=4.0), "format": "pcm24"},
 }
 
 
@@ -258,7 +258,7 @@ def test_a_stimulus_does_not_depend_on_the_rest_of_its_set(
 def test_rms_levels_are_matched(
     tmp_path: Path, recipe: MakeRecipe, rates_hz: tuple[int, ...]
 ) -> None:
-    level = Level(mode="rms", rms_db=-20.0)
+    level = SetLevel(mode="rms", rms_db=-20.0)
     for stimulus in write_set(tmp_path / "set", recipe(level=level, rates_hz=rates_hz)):
         # Measured at the model's rate; a file's steady part begins within a sample of it.
         assert stimulus.level_db == pytest.approx(-20.0, abs=0.01)
@@ -278,7 +278,7 @@ def test_loudness_is_matched(tmp_path: Path, recipe: MakeRecipe) -> None:
     own = [sensation_of(tmp_path / "plain" / s.file, threshold) for s in plain]
     assert np.ptp(own) > 3
     for name, asked_db, wanted_db in (("given", 20.0, 20.0), ("median", None, np.median(own))):
-        level = Level(mode="loudness", threshold="pen-hold", sensation_level_db=asked_db)
+        level = SetLevel(mode="loudness", threshold="pen-hold", sensation_level_db=asked_db)
         stimuli = write_set(tmp_path / name, recipe(level=level, rates_hz=(5000,)))
         for stimulus, own_db in zip(stimuli, own, strict=True):
             found = sensation_of(tmp_path / name / stimulus.file, threshold)
@@ -300,26 +300,26 @@ def test_autoregressive_models_have_no_layers(tmp_path: Path, recipe: MakeRecipe
 
 
 def test_clipping_is_refused_with_what_would_do(tmp_path: Path, recipe: MakeRecipe) -> None:
-    made = recipe(format="pcm24", level=Level(full_scale_g=0.05))
+    made = recipe(format="pcm24", level=SetLevel(full_scale_g=0.05))
     facts = {"expected": ["full scale", "g"], "got": [".wav", "full_scale_g"]}
     with refused(InputError, **facts) as error:
         write_set(tmp_path / "set", made)
     assert not (tmp_path / "set").exists()
     words = str(error.value).split()
     least = float(words[words.index("full_scale_g") + 2])
-    stimuli = write_set(tmp_path / "set", replace(made, level=Level(full_scale_g=least)))
+    stimuli = write_set(tmp_path / "set", replace(made, level=SetLevel(full_scale_g=least)))
     assert 0.998 * least < max(s.peak for s in stimuli) <= least * (1 - 2**-23)
     with refused(InputError, **facts):
-        write_set(tmp_path / "less", replace(made, level=Level(full_scale_g=0.998 * least)))
+        write_set(tmp_path / "less", replace(made, level=SetLevel(full_scale_g=0.998 * least)))
 
 
 def test_arbitrary_units(tmp_path: Path, recipe: MakeRecipe, truth: TextureModel) -> None:
     replace(truth, unit="arbitrary").save(tmp_path / "full/paper.json")
     full = {"models": (ModelEntry(tmp_path / "full", "full"),)}
     with refused(InputError, expected=["g", "loudness"], got=["'arbitrary'", "wall paper"]):
-        write_set(tmp_path / "set", recipe(level=Level(mode="loudness"), **full))
+        write_set(tmp_path / "set", recipe(level=SetLevel(mode="loudness"), **full))
     assert write_set(tmp_path / "set", recipe(**full))[0].unit == "arbitrary"
-    matched = write_set(tmp_path / "g", recipe(level=Level(mode="rms", rms_db=-30), **full))
+    matched = write_set(tmp_path / "g", recipe(level=SetLevel(mode="rms", rms_db=-30), **full))
     assert matched[0].unit == "g"
 
 
@@ -328,7 +328,7 @@ def test_silence(tmp_path: Path, recipe: MakeRecipe) -> None:
     stimulus = write_set(tmp_path / "set", recipe(**at_rest))[0]
     assert (stimulus.rms, stimulus.peak, stimulus.level_db) == (0.0, 0.0, -np.inf)
     assert manifest(tmp_path / "set")[0]["crest_db"] == "n/a"
-    for level in (Level(mode="rms", rms_db=-20), Level(mode="loudness")):
+    for level in (SetLevel(mode="rms", rms_db=-20), SetLevel(mode="loudness")):
         with refused(InputError, names="wall paper_full_0mms_1N", expected="vibration"):
             write_set(tmp_path / "matched", recipe(level=level, **at_rest))
     assert not (tmp_path / "matched").exists()
@@ -364,7 +364,7 @@ def names_that_meet(folder: Path, recipe: Recipe) -> Recipe:
 
 
 def no_threshold(folder: Path, recipe: Recipe) -> Recipe:
-    level = Level(mode="loudness", threshold=folder / "none.tsv")
+    level = SetLevel(mode="loudness", threshold=folder / "none.tsv")
     return replace(recipe, level=level)
 
 
