@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from tactileq.interruption import Interrupted, ended_by_signals
-from tactileq.telling import sentence_of, tell_warning
+from tactileq.printing import print_warning, sentence_of
 
 # The name of every command, and its file in tactileq/commands, which holds a function or a group of
 # commands of that file's name; in the order of tactileq --help.
@@ -81,7 +81,7 @@ def main() -> None:
 
     A signal that asks it to end: one sentence, and 128 + its number.
     """
-    warnings.showwarning = tell_warning
+    warnings.showwarning = print_warning
     try:
         with ended_by_signals():
             app(standalone_mode=True)

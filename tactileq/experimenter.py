@@ -64,13 +64,13 @@ class Terminal:
         self._asked = False
         self._forget_lines()
 
-    def tell(self, standing: ProgressReport) -> None:
+    def report(self, progress: ProgressReport) -> None:
         """Show the progress of the session and the state of the rig."""
-        training = standing.phase == "training"
-        parts = ["training" if training else f"{standing.done} of {standing.of} trials done"]
-        if standing.minutes_left is not None:
-            parts.append(f"about {max(1, round(standing.minutes_left))} min left")
-        parts.append("rig: " + (" ".join(standing.problems) or "ready"))
+        training = progress.phase == "training"
+        parts = ["training" if training else f"{progress.done} of {progress.of} trials done"]
+        if progress.minutes_left is not None:
+            parts.append(f"about {max(1, round(progress.minutes_left))} min left")
+        parts.append("rig: " + (" ".join(progress.problems) or "ready"))
         self._console.print("\n" + " · ".join(parts), markup=False)
 
     def page(self, name: str) -> None:

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from modeling.errors import counted
-from tactileq.keeping import check_own_files, write_own_files
-from tactileq.telling import (
+from tactileq.own_results import check_own_files, write_own_files
+from tactileq.printing import (
     clipping_warnings,
     left_out_warnings,
     progress,

@@ -32,7 +32,7 @@ from rig.capture.grid import StrokeGrid
 from rig.capture.pieces import COLUMNS as PIECE_COLUMNS
 from rig.capture.pieces import PieceStore, Plan
 from rig.hand.scripted import COLUMNS as SCRIPT_COLUMNS
-from rig.hand.scripted import Trajectory as Script
+from rig.hand.scripted import ScriptedTrajectory as Script
 from rig.importing.labels import LABEL_COLUMNS, labels_from_table
 from rig.sound.signals import OF_SURFACES, stimuli_of_surfaces
 

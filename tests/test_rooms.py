@@ -88,7 +88,7 @@ PLANTED = {
         "import analysis.chapters.speed.section",
         "A chapter of the report imports no other",
     ),
-    "tactileq/telling.py": ("import tactileq.commands.demo", "Floors of the command line"),
+    "tactileq/printing.py": ("import tactileq.commands.demo", "Floors of the command line"),
     "modeling/perception/clock.py": ("import time", "modeling is pure numerics"),
     "modeling/hand.py": ("import random", "modeling is pure numerics"),
     "rig/twin.py": ("import tests.conftest", "Nobody imports tests"),

@@ -79,7 +79,7 @@ def load_hand(data_folder: str | Path, answers: Mapping[str, pd.DataFrame]) -> p
         for _, own in table.groupby(["participant_id", "session"], sort=False):
             participant, session = own[["participant_id", "session"]].iloc[0]
             beh = Path(data_folder) / participant / session / "beh"
-            of_session = _of_session(beh / f"{participant}_{session}_task-{task}", own)
+            of_session = _session_table(beh / f"{participant}_{session}_task-{task}", own)
             trials.append(of_session.assign(task=task))
     if not trials:
         return pd.DataFrame(columns=names(HAND_COLUMNS))
@@ -91,7 +91,7 @@ def load_hand(data_folder: str | Path, answers: Mapping[str, pd.DataFrame]) -> p
     return means.assign(trials=cells.size()).reset_index()[names(HAND_COLUMNS)]
 
 
-def _of_session(stem: Path, answers: pd.DataFrame) -> pd.DataFrame:
+def _session_table(stem: Path, answers: pd.DataFrame) -> pd.DataFrame:
     """The answers of a session with what the hand did in each of them."""
     of_trial = answers[["participant_id", "texture", "model"]].reset_index(drop=True)
     keys = pd.MultiIndex.from_frame(answers[_TRIAL].astype(float))

@@ -13,9 +13,9 @@ from analysis.answers.order import (
     Planned,
     check_manifest,
     check_order,
+    open_sessions_warning,
     planned_trials,
-    told_of_open,
-    told_of_unordered,
+    unordered_warnings,
 )
 from analysis.answers.plan import AnalysisPlan, plan_from
 from analysis.answers.responses import PlannedTask, Responses, stands_apart
@@ -290,7 +290,7 @@ def _load_task(
         is_pilot = (task, participant, session) in gathered.pilots
         if left_out and not is_pilot and (table is None or "main" not in set(table["phase"])):
             gathered.add_unread(task, participant, session=session)
-    warnings += [*told_of_unordered(unordered), *_unanswered(folder, task, gathered=gathered)]
+    warnings += [*unordered_warnings(unordered), *_unanswered(folder, task, gathered=gathered)]
     return pd.concat(sessions, ignore_index=True) if sessions else None
 
 
@@ -316,7 +316,7 @@ def _load_session(
     _check_known(table, gathered, path=path)
     gathered.check_once(table, what, path=path)
     planned = _planned_of(path, (participant, session, task), sidecar=sidecar)
-    owed = None if planned is None else told_of_open(table, planned)
+    owed = None if planned is None else open_sessions_warning(table, planned)
     if planned is None:
         unordered.append(what)
     else:

@@ -94,7 +94,7 @@ def _numbered(key: str, number: object) -> str:
     return f"{key}-{number:02d}" if isinstance(number, int) else f"{key}-{number}"
 
 
-def told_of_unordered(sessions: Sequence[str]) -> list[str]:
+def unordered_warnings(sessions: Sequence[str]) -> list[str]:
     """One sentence on sessions without a manifest; none where there are none."""
     if not sessions:
         return []
@@ -106,7 +106,7 @@ def told_of_unordered(sessions: Sequence[str]) -> list[str]:
     return [f"{who} answers could be compared."]
 
 
-def told_of_open(table: pd.DataFrame, planned: Sequence[Planned]) -> str | None:
+def open_sessions_warning(table: pd.DataFrame, planned: Sequence[Planned]) -> str | None:
     """How many main trials were answered, where some were not; a failed one must be repeated.
 
     Parameters

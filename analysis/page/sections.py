@@ -96,12 +96,12 @@ def of_pairs(sections: Mapping[tuple[str, str], Section | None]) -> Section | No
         return first
     return replace(
         first,
-        items=tuple(_of_pair(item, pair) for pair, each in kept.items() for item in each.items),
+        items=tuple(_for_pair(item, pair) for pair, each in kept.items() for item in each.items),
         outcomes=tuple(dict.fromkeys(one for each in kept.values() for one in each.outcomes)),
     )
 
 
-def _of_pair(item: Item, pair: tuple[str, str]) -> Item:
+def _for_pair(item: Item, pair: tuple[str, str]) -> Item:
     reference, other = pair
     return _renamed(
         item,

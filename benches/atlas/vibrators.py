@@ -57,11 +57,11 @@ def uneven_db(response: Floats, notch: Compensation | None) -> float:
     return float(np.abs(20 * np.log10(response * gain)).max())
 
 
-def _of_mass(quality: float) -> Floats:
+def _mass_response(quality: float) -> Floats:
     return np.abs(SimulatedVibrator(RESONANCE_HZ, quality, RATE_HZ).response(FREQUENCIES_HZ))
 
 
-def _of_layer(quality: float) -> Floats:
+def _layer_response(quality: float) -> Floats:
     vibrator = _layer(quality)
     response: Floats = vibrator.peq.response(FREQUENCIES_HZ) / vibrator.flat_gain
     return response
@@ -71,7 +71,7 @@ def mistuned(value: float, column: float, *, which: str, full: bool) -> float:
     """Unevenness (dB), the worse of both directions, of a notch off by this share; Q: `column`."""
     del full
     known = which == ONE_LAYER
-    response = _of_layer(column) if known else _of_mass(column)
+    response = _layer_response(column) if known else _mass_response(column)
     tuned = compensation_for(_layer(column) if known else _identified(column))
     notches = (replace(tuned, frequency_hz=tuned.frequency_hz * (1 + o)) for o in (-value, value))
     return max(uneven_db(response, notch) for notch in notches)
@@ -84,7 +84,7 @@ def of_quality(value: float, column: float, *, how: str, full: bool) -> float:
     """
     del column, full
     if how == WITHOUT:
-        return uneven_db(_of_mass(value), None)
+        return uneven_db(_mass_response(value), None)
     try:
         vibrator = _identified(value)
     except InputError:
@@ -92,7 +92,7 @@ def of_quality(value: float, column: float, *, how: str, full: bool) -> float:
     notch = compensation_for(vibrator)
     if how == OWN_WIDTH:
         notch = replace(notch, bandwidth_hz=vibrator.bandwidth_hz)
-    return uneven_db(_of_mass(value), notch)
+    return uneven_db(_mass_response(value), notch)
 
 
 def badly_measured(value: float, column: float, *, full: bool) -> float:
@@ -103,7 +103,7 @@ def badly_measured(value: float, column: float, *, full: bool) -> float:
             vibrator = found(column, noise=value, duration_s=TEST_S, seed=seed)
         except InputError:
             return math.inf
-        left_db.append(uneven_db(_of_mass(column), compensation_for(vibrator)))
+        left_db.append(uneven_db(_mass_response(column), compensation_for(vibrator)))
     return max(left_db)
 
 

@@ -160,16 +160,16 @@ def _with_middles(axis: Floats) -> Floats:
     return np.sort(np.concatenate((axis, np.sqrt(axis[1:] * axis[:-1]))))
 
 
-def _of_joint(subject: Subject) -> Magnitude:
+def _joint_magnitude(subject: Subject) -> Magnitude:
     return lambda speed, force, frequency: subject.joint.peq(speed, force).response(frequency)
 
 
-def _of_field(subject: Subject) -> Magnitude:
+def _field_magnitude(subject: Subject) -> Magnitude:
     field = fit_field_to_spectra(subject.measured)
     return lambda speed, force, frequency: field.filter(speed, force).response(frequency)
 
 
-def _of_spectra(subject: Subject) -> Magnitude:
+def _spectra_magnitude(subject: Subject) -> Magnitude:
     """Of recorded conditions alone, or holes between them."""
     means = {c: mean_spectrum(found) for c, found in subject.heard.items()}
     grid = next(iter(means.values())).frequency_hz
@@ -246,10 +246,10 @@ AUTOREGRESSIVE, POLE_ZERO, LOOPS = "autoregressive", "poles and zeros", "looped 
 GRAINS, SHAPED = "grains of recordings", "FFT-shaped noise"
 # What loops are made of; whether also half-way between the conditions; whether joint is fitted.
 _LOOPS = {
-    "joint": (_of_joint, True, True),
-    "joint, at conditions": (_of_joint, False, True),
-    "field": (_of_field, True, False),
-    "spectra": (_of_spectra, False, False),
+    "joint": (_joint_magnitude, True, True),
+    "joint, at conditions": (_joint_magnitude, False, True),
+    "field": (_field_magnitude, True, False),
+    "spectra": (_spectra_magnitude, False, False),
 }
 
 

@@ -146,7 +146,7 @@ def load_material(source: Origin) -> Material:
     """
     if source.kind == "recorded":
         return _recorded(source)
-    return _known(*_truth_and_records(source))
+    return _material_with_truth(*_truth_and_records(source))
 
 
 def _truth_and_records(source: Origin) -> tuple[Truth, RecordingSet]:
@@ -165,7 +165,7 @@ def _truth_and_records(source: Origin) -> tuple[Truth, RecordingSet]:
     return _ToolkitTruth(toolkit), records
 
 
-def _known(truth: Truth, records: RecordingSet) -> Material:
+def _material_with_truth(truth: Truth, records: RecordingSet) -> Material:
     start = process_time()
     measured = recording_spectra(records)
     prepare_s = process_time() - start

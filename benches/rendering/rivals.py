@@ -148,9 +148,9 @@ class CompiledStream:
         # Kept, because it owns what the texture points at.
         self._engine = CompiledEngine(model, plan, key=key)
         # Of another cffi module; the structures are the same, from the same header.
-        self._texture = self._of_engine("tq_texture *", self._engine._texture)
+        self._texture = self._engine_pointer("tq_texture *", self._engine._texture)
         if name == KERNEL:
-            self._state = self._of_engine("tq_state *", self._engine._state)
+            self._state = self._engine_pointer("tq_state *", self._engine._state)
             self._call = lib.tq_kernel_calls
         else:
             state = {"kind": _KINDS[name], "key": int(key)}
@@ -159,7 +159,7 @@ class CompiledStream:
             self._state = self._ffi.new("tq_rival *", state)
             self._call = lib.tq_rival_calls
 
-    def _of_engine(self, kind: str, pointer: Any) -> Any:
+    def _engine_pointer(self, kind: str, pointer: Any) -> Any:
         return self._ffi.cast(kind, int(self._engine._ffi.cast("uintptr_t", pointer)))
 
     @property

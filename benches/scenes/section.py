@@ -101,7 +101,7 @@ def _comparison(comparison: pd.DataFrame, simulated: bool) -> Table:
 
 
 def _step_table(examples: Sequence[Example], simulated: bool) -> Table:
-    steps = _of_scenes(examples, steps_table)
+    steps = _tables_by_scene(examples, steps_table)
     return Table(
         "scene_steps",
         "Effect of each step",
@@ -120,13 +120,13 @@ def _texture_table(examples: Sequence[Example], simulated: bool) -> Table:
         "Bounds: GFC30 ≥ 0.95 of the attainable value, error in nine bands and level error ≤ 1 dB "
         "unless the scene specifies others; the worst values include the effects of late updates "
         "and of precision.",
-        _of_scenes(examples, before_after_table),
+        _tables_by_scene(examples, before_after_table),
         SHOWN_TEXTURES,
         simulated,
     )
 
 
-def _of_scenes(
+def _tables_by_scene(
     examples: Sequence[Example], table_of: Callable[[CompiledScene], pd.DataFrame]
 ) -> pd.DataFrame:
     tables = [table_of(one.compiled) for one, _ in examples]

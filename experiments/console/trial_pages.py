@@ -88,7 +88,7 @@ def choose(runner: PageRunner, task: Task, surfaces: Surfaces) -> Choice:
             button.enabled = index in surfaces.felt
             button.lit = surfaces.chosen == index
         confirm.enabled = surfaces.chosen is not None and _remaining(surfaces) == 0
-        told.say(_told(partial(runner.texts.of_task, task.name), surfaces))
+        told.say(_remark(partial(runner.texts.of_task, task.name), surfaces))
 
     reals = [] if real is None else [real]
     runner.show(
@@ -182,7 +182,7 @@ def _remaining(surfaces: Surfaces) -> int:
     return surfaces.count - len(surfaces.felt) if surfaces.feel_all else 0
 
 
-def _told(of: Callable[..., str], surfaces: Surfaces) -> str:
+def _remark(of: Callable[..., str], surfaces: Surfaces) -> str:
     """What to do next: press a number, choose, feel the rest, or confirm the choice."""
     if surfaces.chosen is not None:
         told = of("choice.so_far", number=surfaces.chosen + 1)

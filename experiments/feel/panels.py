@@ -147,7 +147,7 @@ class SpectrumPlot:
         """What changes with the texture alone."""
         return [*self._fixed, *self._legend]
 
-    def tell(self, texture: Texture) -> None:
+    def show_words(self, texture: Texture) -> None:
         """Name what is drawn."""
         fewer = texture.simplified
         self._legend[0].show(f"full model, {counted(texture.full.n_layers, 'layer')}")
@@ -242,7 +242,7 @@ class LayerPanel:
         parts.append(text(window, "frequency (Hz)", at=below, height=TICK_HEIGHT, color=GREY))
         return parts
 
-    def tell(self, plays: ModelNow) -> None:
+    def show_words(self, plays: ModelNow) -> None:
         """Say how many layers are felt, and the level of each."""
         layers = plays.layers
         self._heading.show(f"Layers felt: {felt_words(layers)} (g peak; dB: above threshold)")
@@ -324,7 +324,7 @@ class HandPanel:
         y = [forces[0], forces[0], forces[-1], forces[-1], forces[0]]
         self._grid[0].vertices = self._axes.points(x, y)
 
-    def tell(self, words: str, place: str) -> None:
+    def show_words(self, words: str, place: str) -> None:
         """Say where the hand is."""
         self._words.show(words)
         self._place.show(place)

@@ -287,8 +287,8 @@ class FeelWindow:
         shown = shown or now.full
         if time.perf_counter() >= self._words_due_s:
             self._words_due_s = time.perf_counter() + WORDS_S
-            self._tell(now, shown)
-            self._hand.tell(hand_words(hand), PLACES[now.place])
+            self._show_words(now, shown)
+            self._hand.show_words(hand_words(hand), PLACES[now.place])
         self._ground.draw()
         self._spectrum.draw(now, plays=shown if visit.playing else None)
         self._layers.draw(now, plays=shown)
@@ -296,7 +296,7 @@ class FeelWindow:
         for words in self._status:
             words.draw()
 
-    def _tell(self, now: Now, shown: ModelNow) -> None:
+    def _show_words(self, now: Now, shown: ModelNow) -> None:
         """Bring words and buttons up to date."""
         visit = self._visit
         kind = "full model" if shown is now.full else "simplified model"
@@ -311,8 +311,8 @@ class FeelWindow:
         )
         if any(changes):
             self._ground.renew()
-        self._spectrum.tell(visit.texture)
-        self._layers.tell(shown)
+        self._spectrum.show_words(visit.texture)
+        self._layers.show_words(shown)
         self._hand.choose(visit.texture)
         words = output_words(visit.rig.output(), shown, playing=visit.playing)
         for place, content in zip(self._status, (*words, ""), strict=False):

@@ -35,7 +35,7 @@ class SimulatedExperimenter:
         """Always."""
         return True
 
-    def tell(self, standing: ProgressReport) -> None:
+    def report(self, progress: ProgressReport) -> None:
         """Needs no information."""
 
     def page(self, name: str) -> None:

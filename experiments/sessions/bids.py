@@ -15,14 +15,14 @@ from experiments.sessions.bids_session import Made, session_files
 from experiments.sessions.bids_tables import json_bytes
 from experiments.sessions.data_set import DESCRIPTION_NAME, describe_data_set
 from experiments.sessions.files import SessionFiles
-from experiments.sessions.held import (
+from experiments.sessions.roster import Roster
+from experiments.sessions.stored_sessions import (
     Damaged,
     StoredSession,
     held_session,
     held_sessions,
     participants_of,
 )
-from experiments.sessions.roster import Roster
 from modeling import InputError
 from modeling.errors import counted, shortened
 from modeling.files.documents import read_json_object

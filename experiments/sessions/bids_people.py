@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.sessions.bids_tables import json_bytes, table_bytes
-from experiments.sessions.held import StoredSession
+from experiments.sessions.stored_sessions import StoredSession
 from modeling.files.answer_tables import ANSWER_TABLES, PARTICIPANT_COLUMNS, PARTICIPANT_ID
 from modeling.files.columns import Column, sidecar
 

@@ -14,8 +14,8 @@ from typing import Any
 from experiments.sessions import bids_events
 from experiments.sessions.bids_tables import json_bytes, table_bytes
 from experiments.sessions.files import SessionFiles
-from experiments.sessions.held import StoredSession
 from experiments.sessions.manifest import SessionManifest
+from experiments.sessions.stored_sessions import StoredSession
 from experiments.sessions.trace_rows import TraceRows, hand_rows, presentation_rows
 from experiments.sessions.traces import HAND_COLUMNS
 from modeling import InputError

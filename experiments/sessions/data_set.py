@@ -102,12 +102,12 @@ def _check(
         if found.get(key) != wanted[key]:
             overrides.allow(
                 what,
-                f"expected a data folder of this {_told(key, found, wanted)} in {path}; choose "
+                f"expected a data folder of this {_differs(key, found, wanted)} in {path}; choose "
                 "another data folder for these sessions",
             )
 
 
-def _told(key: str, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
+def _differs(key: str, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
     if key == "StudySHA256":
         return f"study, got another {differing(found.get('StudyDesign'), wanted['StudyDesign'])}"
     if key == "ModelsSHA256":

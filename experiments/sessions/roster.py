@@ -122,7 +122,7 @@ class Roster:
             number = subject if subject is not None else _first_free(entries)
             if number in entries:
                 _require_own_slot(number, entries, path=self.path)
-                yield self._known(entries[number], participants, simulated=simulated)
+                yield self._returning(entries[number], participants, simulated=simulated)
                 return
             self._require_whole(listed)
             slot = _slot(number, participants, entries)
@@ -218,7 +218,7 @@ class Roster:
         except OSError as error:
             raise store_error(error, self.path, _ADVICE) from error
 
-    def _known(
+    def _returning(
         self, entry: Mapping[str, Any], participants: int, *, simulated: bool
     ) -> RosterEntry:
         number, slot = entry["subject"], entry["slot"]

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from experiments.sessions.agenda import Agenda
-from experiments.sessions.held import held_session
 from experiments.sessions.log import read_log
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.order import draw_session
@@ -17,6 +16,7 @@ from experiments.sessions.program import program_facts
 from experiments.sessions.resume import resumption
 from experiments.sessions.roster import Roster, RosterEntry
 from experiments.sessions.store import SessionStore
+from experiments.sessions.stored_sessions import held_session
 from experiments.sessions.surfaces import Intake
 from experiments.sessions.task import Task
 from experiments.sessions.trial_loop import People, SessionResult, run_trials

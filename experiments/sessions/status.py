@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from experiments.sessions.files import require_data_folder
-from experiments.sessions.held import Damaged, StoredSession, held_sessions
 from experiments.sessions.roster import Roster
 from experiments.sessions.state import Status
+from experiments.sessions.stored_sessions import Damaged, StoredSession, held_sessions
 from experiments.study.study import Study
 from modeling import InputError
 from modeling.files.answer_tables import ANSWER_TABLES

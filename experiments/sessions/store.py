@@ -22,11 +22,11 @@ from experiments.sessions.files import (
     open_file,
     write_new,
 )
-from experiments.sessions.held import check_named
 from experiments.sessions.log import ENDINGS, OWN_FIELDS, read_log, utc_text
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.overrides import Overrides
 from experiments.sessions.state import SessionState, state_of
+from experiments.sessions.stored_sessions import check_named
 from experiments.sessions.tables import GrowingTable
 from experiments.sessions.traces import (
     HAND_COLUMNS,

@@ -404,7 +404,7 @@ class Experimenter(Protocol):
         """Whether what was asked last has been confirmed; SessionAborted where it is to end."""
         ...
 
-    def tell(self, standing: ProgressReport) -> None:
+    def report(self, progress: ProgressReport) -> None:
         """Show the progress of the session and the state of the rig."""
         ...
 

@@ -75,7 +75,7 @@ def _rows(path: Path, columns: Columns, *, runs: Collection[int]) -> TraceRows:
     return TraceRows(
         rows=[line for line, fit in zip(others, fits, strict=True) if fit],
         lines=[number for number, fit in zip(numbers, fits, strict=True) if fit],
-        damaged=(_told(wrong, path),) if wrong else (),
+        damaged=(_lines_of(wrong, path),) if wrong else (),
     )
 
 
@@ -88,7 +88,7 @@ def _cell(column: Column) -> str:
     return _NUMBER if column.required else rf"{_NUMBER}|n/a"
 
 
-def _told(lines: Sequence[int], path: Path) -> str:
+def _lines_of(lines: Sequence[int], path: Path) -> str:
     more = len(lines) - 1
     others = f" and {counted(more, 'more line')}" if more else ""
     return f"line {lines[0]}{others} of {path.name}"

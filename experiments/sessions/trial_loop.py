@@ -268,7 +268,7 @@ class _Running:
             self._next_number += 1
         self._at = trial.trial
         began_s = time.monotonic()
-        self._experimenter.tell(self._standing(trial))
+        self._experimenter.report(self._progress(trial))
         if self._task.mounts:
             self._mount(trial)
         else:
@@ -322,7 +322,7 @@ class _Running:
         self._respondent.wait(self._experimenter.ready)
         self.note("mount_confirmed", tray=trial.tray)
 
-    def _standing(self, trial: Trial) -> ProgressReport:
+    def _progress(self, trial: Trial) -> ProgressReport:
         left = None
         if self._durations_s:
             left = median(self._durations_s) * (self._mains - self._mains_done) / 60.0

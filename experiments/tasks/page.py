@@ -100,13 +100,13 @@ def _proofs(study: Study, task: str) -> Iterator[str]:
         )
     if plan.catch_trials:
         yield (
-            f"- {told_of_catch_trials(study, task)}, at random places: the odd one models "
+            f"- {catch_trials_text(study, task)}, at random places: the odd one models "
             f"another texture than the other two ({_pairs(plan)}), all with the {plan.models[0]} "
             "models; not part of the comparison of models."
         )
 
 
-def told_of_catch_trials(study: Study, task: str) -> str:
+def catch_trials_text(study: Study, task: str) -> str:
     """How many catch trials a session of a task has, and what they cost."""
     number = counted(study.plan_of(task).catch_trials or 0, "catch trial")
     minutes = counted(minutes_of_catch_trials(study, task), "minute")
@@ -176,7 +176,7 @@ def proof_of_sensitivity(study: Study, claim: ClaimSection) -> str:
     if claim.task == "absolute" and plan.anchors:
         return "No equality unless the anchors are rated lower than the textures' own models."
     if plan.catch_trials:
-        told = told_of_catch_trials(study, claim.task)
+        told = catch_trials_text(study, claim.task)
         return f"No equality unless the odd one of catch trials is found above chance ({told})."
     advice = {"absolute": "; give it anchors", "oddity": "; give it catch trials"}
     return (

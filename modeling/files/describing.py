@@ -86,7 +86,7 @@ def _default(one: Key) -> str:
 
 
 def _properties(keys: tuple[Key, ...]) -> tuple[dict[str, Any], list[str]]:
-    properties = {name: _of_key(one) for one in keys for name in one.names}
+    properties = {name: _key_schema(one) for one in keys for name in one.names}
     return properties, [one.name for one in keys if one.required]
 
 
@@ -105,7 +105,7 @@ def _object(
     }
 
 
-def _of_key(one: Key) -> dict[str, Any]:
+def _key_schema(one: Key) -> dict[str, Any]:
     about = {"description": f"{one.description} ({one.words})".strip()}
     if not one.required and (value := plain(one.default)) not in (None, (), {}):
         about["default"] = value

@@ -387,10 +387,10 @@ def covariances(field: Field, information: Blocks) -> Covariances:
             gain = -here @ after
             cross = gain @ below
             here = here + cross @ gain.T
-            between = _of_blocks(cross, p)
-            both = _of_blocks(here, p).sum(axis=0) + _of_blocks(below, p).sum(axis=0)
+            between = _diagonal_blocks(cross, p)
+            both = _diagonal_blocks(here, p).sum(axis=0) + _diagonal_blocks(below, p).sum(axis=0)
             differences += both - between.sum(axis=0) - between.sum(axis=0).T
-        each[row * field.columns : (row + 1) * field.columns] = _of_blocks(here, p)
+        each[row * field.columns : (row + 1) * field.columns] = _diagonal_blocks(here, p)
         for column in range(field.columns - 1):
             left = slice(column * p, (column + 1) * p)
             other = slice((column + 1) * p, (column + 2) * p)
@@ -400,7 +400,7 @@ def covariances(field: Field, information: Blocks) -> Covariances:
     return Covariances(each, differences)
 
 
-def _of_blocks(matrix: Floats, p: int) -> Floats:
+def _diagonal_blocks(matrix: Floats, p: int) -> Floats:
     """Diagonal blocks (n, p, p) of a matrix of n × n blocks."""
     n = matrix.shape[0] // p
     blocks = matrix.reshape(n, p, n, p)

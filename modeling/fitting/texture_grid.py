@@ -65,23 +65,23 @@ class TextureGrid:
         return np.array([power is not None for power in self.powers], dtype=bool)
 
     @cached_property
-    def _known(self) -> list[Power]:
+    def _powers_there(self) -> list[Power]:
         return [power for power in self.powers if power is not None]
 
     @cached_property
     def scale(self) -> float:
         """The unit of all gains in a fit: geometric mean of the spectra's maxima."""
-        return float(np.exp(np.mean([np.log(power.scale) for power in self._known])))
+        return float(np.exp(np.mean([np.log(power.scale) for power in self._powers_there])))
 
     @property
     def rate_hz(self) -> float:
         """Of all spectra."""
-        return self._known[0].rate_hz
+        return self._powers_there[0].rate_hz
 
     @cached_property
     def step_hz(self) -> float:
         """The finest distance of spectral lines."""
-        return min(power.step_hz for power in self._known)
+        return min(power.step_hz for power in self._powers_there)
 
     @cached_property
     def steps_hz(self) -> Floats:
@@ -215,7 +215,7 @@ class TextureGrid:
     @cached_property
     def sampled(self) -> Observed:
         """Frequencies at which responses are compared, one row, evenly spaced in logarithms."""
-        highest = max(power.frequency_hz[-1] for power in self._known)
+        highest = max(power.frequency_hz[-1] for power in self._powers_there)
         frequency = np.geomspace(LOWEST_HZ, highest, SAMPLED)
         tangent = np.tan(np.pi / self.rate_hz * frequency)[None]
         one = np.ones(tangent.shape)

@@ -95,7 +95,7 @@ class Staged:
         InputError
             As `staged`.
         """
-        with _told(self.folder):
+        with _refusals_in_one_sentence(self.folder):
             if (self.folder / INDEX_NAME).is_file():
                 return self._move(self.folder, beside)
             seen = check_replaceable(self.folder, index_name=INDEX_NAME, what="a recording set")
@@ -142,7 +142,7 @@ def staged(
     """
     target = Path(folder)
     with ExitStack() as stack:
-        with _told(target):
+        with _refusals_in_one_sentence(target):
             if there := (target / INDEX_NAME).is_file():
                 _check_conditions(target, listed(target), recordings)
             else:
@@ -171,7 +171,7 @@ def _check_new(target: Path) -> None:
 
 
 @contextmanager
-def _told(target: Path) -> Iterator[None]:
+def _refusals_in_one_sentence(target: Path) -> Iterator[None]:
     """The disk's refusal, as one sentence."""
     try:
         yield

@@ -121,7 +121,7 @@ def common_hum(
         numbers = [np.rint(f.frequency_hz / mains_hz) for f in found]
         every = np.unique(np.concatenate(numbers))
         held = np.array([np.isin(every, n) for n in numbers])
-        common = every[_of_all_speeds(held, speeds)]
+        common = every[_at_most_speeds(held, speeds)]
         here = int(held[:, np.isin(every, common)].sum())
         if here > most:  # of harmonics that both mains share the one with more besides
             most = here
@@ -132,7 +132,7 @@ def common_hum(
     return lines
 
 
-def _of_all_speeds(held: Bools, speeds_mm_s: Floats) -> Bools:
+def _at_most_speeds(held: Bools, speeds_mm_s: Floats) -> Bools:
     """Which lines are in half of the records and at most of the speeds; `held` is (records, k)."""
     at_speed = np.array([held[speeds_mm_s == v].any(axis=0) for v in np.unique(speeds_mm_s)])
     wide = (2 * at_speed.sum(axis=0) > len(at_speed)) & (at_speed.sum(axis=0) > 1)

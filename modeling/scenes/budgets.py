@@ -72,7 +72,7 @@ def beyond_budget(searches: Sequence[Search], scene: Scene) -> str:
     nearest = _nearest_bound(searches, scene)
     advice = "raise the budget, or take fewer textures"
     if nearest is not None:
-        advice = f"the closest bound that fits is {_told(nearest)}"
+        advice = f"the closest bound that fits is {_bound_in_words(nearest)}"
     return (
         f"expected the scene {scene.name} within {' and '.join(asked)}, got one that takes "
         f"{operations:.1f} operations per sample and {_bytes(smallest)} bytes at least to keep its "
@@ -80,7 +80,7 @@ def beyond_budget(searches: Sequence[Search], scene: Scene) -> str:
     )
 
 
-def _told(bound: Bound) -> str:
+def _bound_in_words(bound: Bound) -> str:
     """A bound in few digits, rounded so that it is not stricter."""
     wider = {
         "gfc30": np.floor(1e4 * bound.gfc30) / 1e4,

@@ -17,7 +17,7 @@ from modeling.scenes.budgets import beyond_budget, within_budget
 from modeling.scenes.compiled import CompiledScene
 from modeling.scenes.results import compiled_texture
 from modeling.scenes.scene import Scene
-from modeling.scenes.search import Known, Search
+from modeling.scenes.search import ComputedModels, Search
 
 
 def compile_scene(
@@ -56,14 +56,14 @@ def compile_scenes(
 
     Parameters and errors as there; `progress` is also called with the scene.
     """
-    known = Known()
+    known = ComputedModels()
     return [_compiled(scene, models, known, progress=partial(progress, scene)) for scene in scenes]
 
 
 def _compiled(
     scene: Scene,
     models: Mapping[str, TextureModel],
-    known: Known,
+    known: ComputedModels,
     *,
     progress: Callable[[str], None],
 ) -> CompiledScene:

@@ -72,11 +72,11 @@ def scene_models(
     known = full_models(scene)[1] if full is None else full
     done: list[str] = []
 
-    def tell(texture: str) -> None:
+    def warn(texture: str) -> None:
         done.append(texture)
         progress(len(done) / len(scene.textures or known), texture)
 
-    return compile_scene(scene, known, progress=tell).models
+    return compile_scene(scene, known, progress=warn).models
 
 
 def scene_files(path: str | Path) -> tuple[Path, ...]:

@@ -73,8 +73,8 @@ def places_of(model: TextureModel, hand: HandUse) -> Places:
         time).
     """
     if isinstance(hand, HandRange):
-        return _of_range(model, hand)
-    return _of_places(model, hand)
+        return _places_in_range(model, hand)
+    return _places_as_listed(model, hand)
 
 
 def nodes_of(model: TextureModel) -> tuple[Floats, Floats]:
@@ -100,7 +100,7 @@ def ranges_of(model: TextureModel, hand: HandRange) -> tuple[Range, Range]:
     )
 
 
-def _of_range(model: TextureModel, hand: HandRange) -> Places:
+def _places_in_range(model: TextureModel, hand: HandRange) -> Places:
     speeds, forces = nodes_of(model)
     speed_range, force_range = ranges_of(model, hand)
     rows, columns = enclosing(speeds, speed_range), enclosing(forces, force_range)
@@ -142,7 +142,7 @@ def enclosing(axis: Floats, asked: Range) -> Bools:
     return (index >= first) & (index <= last)
 
 
-def _of_places(model: TextureModel, hand: HandPlaces) -> Places:
+def _places_as_listed(model: TextureModel, hand: HandPlaces) -> Places:
     speeds, forces = nodes_of(model)
     beyond = (hand.speed_mm_s > speeds[-1]) | (hand.force_n > forces[-1])
     too_long = float(hand.share[beyond].sum())

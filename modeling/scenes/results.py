@@ -50,7 +50,7 @@ def _measures(search: Search, candidate: Candidate) -> tuple[Measured, ...]:
     counts, share = search.places.counts.ravel(), search.places.share.ravel()
     weights = np.where(counts, share, 0.0) / share[counts].sum()
     at_rest, together = candidate.at_rest, candidate.together
-    of_full = _of_full(search, candidate)
+    of_full = _errors_of_full_model(search, candidate)
     bound = search.scene.bound
 
     def measured(name: Any, kind: int) -> Measured:
@@ -72,7 +72,7 @@ def _measures(search: Search, candidate: Candidate) -> tuple[Measured, ...]:
     return tuple(measured(name, kind) for kind, name in enumerate(bound.to_dict()))
 
 
-def _of_full(search: Search, candidate: Candidate) -> Errors:
+def _errors_of_full_model(search: Search, candidate: Candidate) -> Errors:
     """Errors against the full model at the places that count, moved into the scene."""
     ours, full = (
         search.yardstick.features(model.parameters(*search.places.visited))

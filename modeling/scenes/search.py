@@ -73,7 +73,7 @@ def _table_numbers(model: Layered) -> int:
     return table_numbers(model.speeds_mm_s.size, model.forces_n.size, model.n_layers)
 
 
-class Known:
+class ComputedModels:
     """What is known of models whatever the scene."""
 
     def __init__(self) -> None:
@@ -99,7 +99,7 @@ def _holds_in_single(candidate: Candidate) -> bool:
 class Search:
     """Everything that may become of one texture in a scene."""
 
-    def __init__(self, full: TextureModel, scene: Scene, known: Known) -> None:
+    def __init__(self, full: TextureModel, scene: Scene, known: ComputedModels) -> None:
         self.full, self.scene, self._known = full, scene, known
         self.played = known.get(("played", full.texture), partial(played, full))
         self.places = places_of(full, scene.hand)

@@ -85,7 +85,7 @@ def main() -> None:
         source.open()
         log, closing = PenLog(source), threading.Event()
         threading.Thread(target=_follow, args=(log, closing), daemon=True).start()
-        parent.tell(Listening(source.rate_hz))
+        parent.send(Listening(source.rate_hz))
         parent.serve(Request, lambda request: _answer(log, source, request=request))
         closing.set()
         source.close()

@@ -20,7 +20,7 @@ BEAT_S = 0.002  # readings are written so often at most, and at rest
 AGAIN_S = 0.5  # between attempts to open a device that is gone
 COUNTS_S = 1.0  # between reports of what was read and lost
 
-Tell = Callable[[HandFault | Counts | Firmware], None]
+Send = Callable[[HandFault | Counts | Firmware], None]
 
 
 class HandLoop:
@@ -30,7 +30,7 @@ class HandLoop:
     ----------
     live : Live
     settings : HandSettings
-    tell : callable
+    send : callable
         Takes what the parent should know.
     opening : callable
         Gives the open device; InputError where it cannot.
@@ -41,12 +41,12 @@ class HandLoop:
         live: Live,
         settings: HandSettings,
         *,
-        tell: Tell,
+        send: Send,
         opening: Callable[[HandSettings], Device] = open_device,
     ) -> None:
         self._live = live
         self._settings = settings
-        self._tell = tell
+        self._send = send
         self._opening = opening
         self._device: Device | None = None
         self._follower = Follower(settings, rest_s=REST_S)
@@ -122,26 +122,26 @@ class HandLoop:
                 self._unwritten = reading
         if device.firmware != self._firmware:
             self._firmware = device.firmware
-            self._tell(Firmware(self._firmware))
+            self._send(Firmware(self._firmware))
         counts = device.counts()
         if samples:
-            self._tell_late(device, counts.get("late", 0))
+            self._report_late(device, counts.get("late", 0))
         self._report(counts)
 
-    def _tell_late(self, device: Device, late: int) -> None:
+    def _report_late(self, device: Device, late: int) -> None:
         """Once samples are in time again, report how many were late."""
         if late > self._late:
             told = (
                 f"expected the readings of the {device.name} within {LOST_S:g} s, got "
                 f"{late - self._late} that came later and were dropped; close other programs."
             )
-            self._tell(HandFault(told))
+            self._send(HandFault(told))
             self._late = late
 
     def _report(self, counts: dict[str, int]) -> None:
         if counts != self._counts and now_s() > self._counts_s + COUNTS_S:
             self._counts, self._counts_s = counts, now_s()
-            self._tell(Counts(counts))
+            self._send(Counts(counts))
 
     def _lose(self, why: str) -> None:
         self._write(self._follower.gone(now_s()))
@@ -151,7 +151,7 @@ class HandLoop:
         self._again_s = now_s() + AGAIN_S
         if why != self._told:
             self._told = why
-            self._tell(HandFault(why))
+            self._send(HandFault(why))
 
     def _open_again(self) -> None:
         """Try to open the device in a thread: a sensor may take seconds, and the beat goes on."""

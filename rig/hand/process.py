@@ -24,7 +24,7 @@ def main() -> None:
         wanted = parent.settings(ReadHand)
         parent_gone = threading.Event()
         with Live.attach(wanted.live) as live:
-            loop = HandLoop(live, wanted.settings, tell=parent.tell)
+            loop = HandLoop(live, wanted.settings, send=parent.send)
             threading.Thread(target=_listen, args=(parent, loop, parent_gone), daemon=True).start()
             _open(parent, loop, patient=wanted.patient)
             gc.collect()
@@ -39,11 +39,11 @@ def main() -> None:
 def _open(parent: Parent, loop: HandLoop, *, patient: bool) -> None:
     """Open the device; a patient loop waits for one that is not there."""
     try:
-        parent.tell(Ready(loop.open()))
+        parent.send(Ready(loop.open()))
     except InputError as error:
         if not patient:
             raise
-        parent.tell(HandFault(str(error)))
+        parent.send(HandFault(str(error)))
 
 
 def _listen(parent: Parent, loop: HandLoop, parent_gone: threading.Event) -> None:

@@ -138,7 +138,7 @@ class HandReader:
     def unplug(self, unplugged: bool = True) -> None:
         """Have the process act as if the device were unplugged, or plugged in again; for tests."""
         if self._child is not None:
-            self._child.tell(Unplug(unplugged))
+            self._child.send(Unplug(unplugged))
 
     @property
     def pid(self) -> int | None:

@@ -519,7 +519,7 @@ def _time_column(path: Path, columns: Mapping[str, Floats]) -> TimeColumn | None
         TimeColumn(path.name, name, _name_and_unit(name)[1], columns[name])
         for name in _times_in(columns)
     ]
-    return next((time for time in every if time.tells_a_rate()), every[0] if every else None)
+    return next((time for time in every if time.has_a_rate()), every[0] if every else None)
 
 
 def _chosen_axes(path: Path, columns: dict[str, Floats], axis: Axis | None) -> tuple[Floats, str]:

@@ -69,14 +69,16 @@ def doubts_about(
     g_per_fullscale : float, optional
         By which its numbers were multiplied.
     """
-    found = [_of_condition(*recording.condition)]
-    found.append("" if g_per_fullscale is None else _of_scale(g_per_fullscale))
+    found = [_condition_doubt(*recording.condition)]
+    found.append("" if g_per_fullscale is None else _scale_doubt(g_per_fullscale))
     if recording.unit == "g" and not found[-1]:
-        found.append(_of_level(recording, unit, g_per_fullscale) or _of_gravity(recording, unit))
+        found.append(
+            _level_doubt(recording, unit, g_per_fullscale) or _gravity_doubt(recording, unit)
+        )
     return tuple(f"{name}: {doubt}" for doubt in found if doubt)
 
 
-def _of_condition(speed_mm_s: float, force_n: float) -> str:
+def _condition_doubt(speed_mm_s: float, force_n: float) -> str:
     if _is_condition(speed_mm_s, force_n):
         return ""
     others = {
@@ -104,7 +106,7 @@ def _is_condition(speed_mm_s: float, force_n: float) -> bool:
     )
 
 
-def _of_scale(g: float) -> str:
+def _scale_doubt(g: float) -> str:
     if SCALES_G.holds(g):
         return ""
     fitting = [
@@ -118,7 +120,7 @@ def _of_scale(g: float) -> str:
     )
 
 
-def _of_level(recording: Recording, unit: str, g_per_fullscale: float | None) -> str:
+def _level_doubt(recording: Recording, unit: str, g_per_fullscale: float | None) -> str:
     level_g = float(np.std(recording.samples))
     # At rest, or without contact, a sensor may be as silent as it likes.
     is_at_rest = 0 in (recording.speed_mm_s, recording.force_n)
@@ -137,7 +139,7 @@ def _of_level(recording: Recording, unit: str, g_per_fullscale: float | None) ->
     )
 
 
-def _of_gravity(recording: Recording, unit: str) -> str:
+def _gravity_doubt(recording: Recording, unit: str) -> str:
     constant_g = abs(float(np.mean(recording.samples)))
     # The mean of a strong vibration is uncertain, and says less than its level.
     is_constant = constant_g > np.std(recording.samples)

@@ -99,7 +99,7 @@ class TimeColumn:
             )
         return rate_hz
 
-    def tells_a_rate(self) -> bool:
+    def has_a_rate(self) -> bool:
         """Whether `rate_hz` does."""
         try:
             self.rate_hz()
@@ -152,7 +152,7 @@ class TimeColumn:
 
         docs/method/recordings.md#uneven-samples
         """
-        if not self.tells_a_rate():
+        if not self.has_a_rate():
             return None
         rms_s, most_s = _astray(self._time_s())
         highest_hz = min(rate_hz, MODEL_RATE_HZ) / 2

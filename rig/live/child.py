@@ -117,10 +117,10 @@ class Child:
         ChildLost
             If it has ended, does not answer in time or answers something else.
         """
-        self.tell(request)
+        self.send(request)
         return self.hear(kind, within_s=within_s)  # type: ignore[no-any-return]
 
-    def tell(self, request: Message) -> None:
+    def send(self, request: Message) -> None:
         """Send a request; ChildLost if it has ended."""
         try:
             send(self._stdin, request)

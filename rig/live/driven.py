@@ -35,14 +35,14 @@ class Parent:
 
     def __exit__(self, kind: object, error: object, trace: object) -> bool:
         if isinstance(error, InputError):
-            self.tell(Refused(str(error)))
+            self.send(Refused(str(error)))
         return isinstance(error, InputError | BrokenPipeError)
 
     def settings(self, kind: type[Settings]) -> Settings:
         """What this process was started with."""
         return decoded(next(self._received, b""), kind)  # type: ignore[no-any-return]
 
-    def tell(self, message: Message) -> None:
+    def send(self, message: Message) -> None:
         """Send a message."""
         send(self._answers, message)
 
@@ -53,4 +53,4 @@ class Parent:
                 reply = answer(decoded(data, requests))
             except InputError as error:
                 reply = Refused(str(error))
-            self.tell(reply)
+            self.send(reply)

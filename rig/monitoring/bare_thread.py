@@ -59,7 +59,7 @@ def main() -> None:
     with Parent() as parent:
         thread = BareThread(parent.settings(float))
         threading.Thread(target=thread.run, daemon=True).start()
-        parent.tell(Done())
+        parent.send(Done())
         parent.serve(Look, lambda _: WakeUps(thread.periods, thread.misses))
 
 

@@ -34,7 +34,7 @@ def main() -> None:
         card = parent.settings(Card)
         stream = _stream(card.vibrator, name=card.name)
         stream.start()
-        parent.tell(Done())
+        parent.send(Done())
         parent.serve(Done, lambda done: done)
 
 

@@ -311,7 +311,7 @@ class SoundOutput:
 
         None of a signal, where nothing was begun, or where its process is gone.
         """
-        told = self._told(Count(self._presentation), Corrected)
+        told = self._reply(Count(self._presentation), Corrected)
         if told is None or told.counters is None:
             return None
         return Counted(presentation=self._presentation, counters=told.counters)
@@ -340,7 +340,7 @@ class SoundOutput:
                 "rig file."
             )
         self._masking = level
-        self._told(Mask(level), Done)  # if it is lost, the next process begins with this level
+        self._reply(Mask(level), Done)  # if it is lost, the next process begins with this level
 
     # --- Health -----------------------------------------------------------------------------
 
@@ -419,7 +419,7 @@ class SoundOutput:
                 "(tactileq rig check)."
             ) from None
 
-    def _told(self, request: Count | Mask, kind: type[Reply]) -> Reply | None:
+    def _reply(self, request: Count | Mask, kind: type[Reply]) -> Reply | None:
         """The process' answer; None where there is no process, or it is lost."""
         try:
             return None if self._child is None else self._child.ask(request, kind)

@@ -206,7 +206,7 @@ def main() -> None:
     with Parent() as parent:
         player = Player(parent.settings(SoundSettings))
         try:
-            parent.tell(Playing(player.latency_s))
+            parent.send(Playing(player.latency_s))
             parent.serve(Request, player.answer)
         finally:
             player.close()

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tactileq.keeping import check_own_results
 from tactileq.options import Out, Seed
-from tactileq.telling import progress, share_of, usable_recordings
+from tactileq.own_results import check_own_results
+from tactileq.printing import progress, share_of, usable_recordings
 from tactileq.workers import working
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactileq.keeping import check_own_results
 from tactileq.options import Out
-from tactileq.telling import progress
+from tactileq.own_results import check_own_results
+from tactileq.printing import progress
 from tactileq.workers import working
 
 if TYPE_CHECKING:
@@ -198,11 +198,11 @@ def bench_rendering_into(out: Path, *, quick: bool, plot: bool) -> None:
             "import_s": timed.import_s,
         }
         seal_folder(fresh, provenance_of("bench render", settings))
-    _tell_bench(timed)
+    _print_bench(timed)
     print(f"{int(timed.aims['met'].sum())} of {len(timed.aims)} targets met: {out / 'aims.tsv'}")
 
 
-def _tell_bench(bench: RenderingBench) -> None:
+def _print_bench(bench: RenderingBench) -> None:
     """The tables, in ns per sample, and what else was measured."""
     print(f"{bench.machine}\n{bench.compiler}\n\nns per sample, noise included\n")
     tables = {

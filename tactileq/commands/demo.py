@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from tactileq.commands.simulate import run_study
 from tactileq.commands.stability import columns_of, examine_column
 from tactileq.commands.stimuli import render_set
-from tactileq.keeping import check_own_results
 from tactileq.options import Out, Seed
-from tactileq.telling import progress, share_of
+from tactileq.own_results import check_own_results
+from tactileq.printing import progress, share_of
 from tactileq.workers import mapping
 
 if TYPE_CHECKING:

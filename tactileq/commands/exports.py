@@ -9,10 +9,10 @@ from typing import Annotated
 import typer
 
 from modeling.errors import counted
-from tactileq.commands.stimuli import recipe_from, tell_beyond_grid
-from tactileq.keeping import note_of_file, write_own_files
+from tactileq.commands.stimuli import print_beyond_grid, recipe_from
 from tactileq.options import ModelFile, Seed, VibratorFile
-from tactileq.telling import simulated_note
+from tactileq.own_results import note_of_file, write_own_files
+from tactileq.printing import simulated_note
 
 exports = typer.Typer(
     no_args_is_help=True,
@@ -198,7 +198,7 @@ def export_wav_file(
     settings = {"recipe": recipe.to_toml()}
     provenance = provenance_of("export wav", settings, seed=seed, inputs=inputs)
     write_own_files({target: data}, note, provenance, texture=model.texture)
-    tell_beyond_grid(sources)
+    print_beyond_grid(sources)
     drive = "" if vibrator is None else ", as drive signal for the vibrator"
     simulated = " (simulated)" if stimulus.simulated == "true" else ""
     print(

@@ -13,7 +13,7 @@ import typer
 
 from modeling.errors import counted, shown
 from tactileq.options import Out, Seed
-from tactileq.telling import clipping_warnings, progress
+from tactileq.printing import clipping_warnings, progress
 
 if TYPE_CHECKING:
     from modeling import RecordingSet
@@ -229,7 +229,7 @@ def import_hatt(
         "seed": seed,
     }
     add_to_set(out, records, "import hatt", settings=settings, inputs=inputs, yes=yes)
-    tell_conditions(made, grids)
+    print_conditions(made, grids)
 
 
 def check_one_file_each(files: Sequence[Path], materials: Sequence[str]) -> None:
@@ -410,7 +410,7 @@ def imports_before(provenance: Path) -> list[dict[str, Any]]:
     return history
 
 
-def tell_conditions(made: Sequence[RecordingSet], grids: Sequence[ToolkitGrid | None]) -> None:
+def print_conditions(made: Sequence[RecordingSet], grids: Sequence[ToolkitGrid | None]) -> None:
     """Report which conditions were taken: a line for each of the first textures, then their sum."""
     for records, grid in list(zip(made, grids, strict=True))[:MOST_NAMES]:
         phrase = own_range(records) if grid is None else grid.describe()

@@ -66,7 +66,7 @@ def _require_all(outcomes: Sequence[TextureOutcome]) -> None:
     if len(outcomes) == len(failed) == 1:
         raise ValueError(failed[0].error)
     for outcome in outcomes:
-        _tell(outcome)
+        _print(outcome)
     if failed:
         raise ValueError(
             f"expected {counted(len(outcomes), 'texture')} that can be modelled, got {len(failed)} "
@@ -75,7 +75,7 @@ def _require_all(outcomes: Sequence[TextureOutcome]) -> None:
         )
 
 
-def _tell(outcome: TextureOutcome) -> None:
+def _print(outcome: TextureOutcome) -> None:
     for warning in outcome.warnings:
         print(warning, file=sys.stderr)
     for note in outcome.notes:

@@ -13,7 +13,6 @@ import typer
 
 from modeling.errors import shown
 from tactileq.commands.session import models_of_study
-from tactileq.keeping import check_own_results
 from tactileq.options import (
     Models,
     Out,
@@ -23,7 +22,8 @@ from tactileq.options import (
     StudyArgument,
     ThresholdName,
 )
-from tactileq.telling import progress, tell_models
+from tactileq.own_results import check_own_results
+from tactileq.printing import print_models, progress
 from tactileq.workers import working
 
 if TYPE_CHECKING:
@@ -101,9 +101,9 @@ def power(
         threshold=threshold,
         planted=planted,
     )
-    tell_models(people.models, plan.textures)
+    print_models(people.models, plan.textures)
 
-    def tell_first(table: pd.DataFrame, left_s: float) -> None:
+    def print_first(table: pd.DataFrame, left_s: float) -> None:
         done = int(table["simulations"].iloc[0])
         print(f"first estimate, from {done} of {simulations} simulated studies:")
         for line in _sentences(table, plan, out):
@@ -119,7 +119,7 @@ def power(
             jobs=jobs,
             dask=dask,
             advance=advance,
-            first=tell_first,
+            first=print_first,
         )
     settings = {
         "study_sha256": plan.sha256,

@@ -9,7 +9,7 @@ import typer
 
 from modeling.errors import counted
 from tactileq.options import AssumedForce, CountsPerMm, HandDevice, HandKind, OptionalRigPath, Seed
-from tactileq.telling import progress
+from tactileq.printing import progress
 
 
 def record(

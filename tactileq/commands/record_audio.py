@@ -167,7 +167,7 @@ def record_by_hand(folder: Path, options: HandRecording) -> None:
     if hand.assumed_force_n is not None and (hand.without_pressure or hand.kind in WITHOUT_FORCE):
         check_assumed_force(grid, hand.assumed_force_n)
     if rig is not None and options.input.g_per_fullscale is None:
-        tell_assumed(rig)
+        print_assumed(rig)
     record_on(grid, folder, options, rig=rig, hand=hand, heard=heard)
 
 
@@ -238,7 +238,7 @@ def provenance_of_run(
     return provenance_of("record --audio", every, inputs=sha256_of_paths(files))
 
 
-def tell_assumed(rig: RigFile) -> None:
+def print_assumed(rig: RigFile) -> None:
     """Note that levels depend on a scale that was assumed, not measured."""
     scale = None if rig.accelerometer is None else rig.accelerometer.g_per_fullscale
     if scale is not None and scale.assumed:
@@ -286,7 +286,7 @@ def run(recorder: StrokeRecorder, faults: Callable[[], tuple[str, ...]]) -> None
                 time.sleep(STEP_S)
     finally:
         recorder.end()
-        tell(recorder, before=before)
+        print_state(recorder, before=before)
 
 
 @contextmanager
@@ -310,7 +310,7 @@ def shown_map(recorder: StrokeRecorder, console: Console) -> Iterator[Callable[[
     yield show
 
 
-def tell(recorder: StrokeRecorder, *, before: int) -> None:
+def print_state(recorder: StrokeRecorder, *, before: int) -> None:
     """What was recorded, what is missing, and what was wrong."""
     for warning in recorder.warnings():
         print(f"warning: {warning}", file=sys.stderr)

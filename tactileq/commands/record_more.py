@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from modeling.errors import InputError, counted
-from tactileq.telling import left_out_warnings, progress
+from tactileq.printing import left_out_warnings, progress
 
 if TYPE_CHECKING:
     from modeling import RecordingSet

@@ -11,7 +11,7 @@ import typer
 
 from modeling.errors import counted
 from tactileq.options import RigPath, Seed
-from tactileq.telling import share_of
+from tactileq.printing import share_of
 
 if TYPE_CHECKING:
     from rig.calibration.latency import LatencySummary, Part

@@ -92,7 +92,7 @@ def play(rig: RigFile, signal: PreparedSignal, *, times: int) -> None:
     from rig.desk.lock import rig_locked
     from rig.desk.parts import sound_output
     from rig.live.memory import Live
-    from tactileq.telling import progress
+    from tactileq.printing import progress
 
     compensated = signal.vibrator_sha256 is not None
     with rig_locked(rig.rig.name), Live.create() as live:

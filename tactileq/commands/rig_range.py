@@ -11,9 +11,9 @@ import typer
 
 from modeling.errors import counted
 from tactileq.commands.record_audio import HandOptions, hand_from, opened_hand, rig_from, since_now
-from tactileq.keeping import note_of_file, write_own_files
 from tactileq.options import AssumedForce, CountsPerMm, HandDevice, HandKind, OptionalRigPath, Out
-from tactileq.telling import share_of
+from tactileq.own_results import note_of_file, write_own_files
+from tactileq.printing import share_of
 
 if TYPE_CHECKING:
     from modeling.arrays import Floats

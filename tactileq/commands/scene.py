@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from modeling.errors import counted
-from tactileq.keeping import check_own_results
 from tactileq.options import Out, Seed
-from tactileq.telling import progress, simulated_note
+from tactileq.own_results import check_own_results
+from tactileq.printing import progress, simulated_note
 
 if TYPE_CHECKING:
     from modeling import CompiledScene, Renderer
@@ -71,9 +71,9 @@ def scene(
         write_scene(compiled, fresh, seed=seed)
         seal_folder(fresh, provenance_of("scene", settings, seed=seed, inputs=inputs))
     for texture in compiled.textures:
-        tell_texture(texture)
+        print_texture(texture)
         if is_compiled():
-            tell_in_motion(texture, compiled, seed=seed)
+            print_in_motion(texture, compiled, seed=seed)
     if not is_compiled():
         print("note: without the compiled kernel no strokes are rendered for timing and checking.")
     print(
@@ -115,7 +115,7 @@ def header_of(compiled: CompiledScene, name: str, *, seed: int) -> str:
     return scene_header(name, scene.name, compiled.rendered, seed=seed, note=note)
 
 
-def tell_texture(texture: CompiledTexture) -> None:
+def print_texture(texture: CompiledTexture) -> None:
     """Print what a texture was reduced to, what it costs, and how close it is to the bound."""
     from analysis.textures.scenes import driven_by
     from modeling.scenes.cost import stored_numbers
@@ -150,7 +150,7 @@ def _share(measured: Measured) -> float:
     return worst / bound if bound else 0.0
 
 
-def tell_in_motion(texture: CompiledTexture, compiled: CompiledScene, *, seed: int) -> None:
+def print_in_motion(texture: CompiledTexture, compiled: CompiledScene, *, seed: int) -> None:
     """Render random strokes: print the times per sample, and how often the bound is kept."""
     from modeling import Renderer
     from modeling.scenes.strokes import random_stroke, windows_kept

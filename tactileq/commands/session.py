@@ -10,7 +10,7 @@ import typer
 from modeling.errors import counted
 from modeling.files.answer_tables import ANSWER_TABLES
 from tactileq.options import Data, Models, SceneModels, Simplified, StudyFile
-from tactileq.telling import share_of, tell_foreign_models
+from tactileq.printing import print_foreign_models, share_of
 
 if TYPE_CHECKING:
     TaskName = str
@@ -89,10 +89,10 @@ def session(
         sources=sources,
     )
     sets.require(plan, allow=Overrides(override).allow)
-    tell_foreign_models(sets, plan.textures)
+    print_foreign_models(sets, plan.textures)
     device = rig_of(plan, sets, rig=rig, override=override)
     if selftest:
-        tell_timings(sets, device, plan=plan, data=data, fullscreen=fullscreen, screen=screen)
+        print_timings(sets, device, plan=plan, data=data, fullscreen=fullscreen, screen=screen)
         return
     stamp = ", ".join(["pilot"] * pilot + ["simulated rig"] * device.simulated)
     if device.simulated:
@@ -215,7 +215,7 @@ def open_console(
     )
 
 
-def tell_timings(
+def print_timings(
     sets: ModelSets,
     device: TextureRig,
     *,

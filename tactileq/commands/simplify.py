@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from modeling.errors import counted
-from tactileq.keeping import check_own_files, write_own_files
 from tactileq.many_textures import recording_folders
 from tactileq.options import Criterion, HoldAbove, Margin, ModelFile, ThresholdName
-from tactileq.telling import simulated_note, usable_recordings
+from tactileq.own_results import check_own_files, write_own_files
+from tactileq.printing import simulated_note, usable_recordings
 
 if TYPE_CHECKING:
     from modeling import RecordingSet, Simplification, TextureModel
@@ -101,7 +101,7 @@ def simplify(
     contents = {Path(f"{start}{ending}"): data for ending, data in files.items()}
     provenance = provenance_of("simplify", settings, inputs=inputs)
     write_own_files(contents, note, provenance, texture=full.texture)
-    tell_verdicts(result)
+    print_verdicts(result)
     if result.identical:
         print(
             f"note: {full.texture}: the simplified model is identical to the full one; there is "
@@ -113,7 +113,7 @@ def simplify(
     )
 
 
-def tell_verdicts(result: Simplification) -> None:
+def print_verdicts(result: Simplification) -> None:
     """Print the verdict on each layer with its reason, and the threshold."""
     for verdict in result.layers:
         line = f"layer {verdict.layer}: {verdict.verdict}, {verdict.reason}"

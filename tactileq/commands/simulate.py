@@ -16,7 +16,7 @@ from tactileq.options import (
     StudyFile,
     ThresholdName,
 )
-from tactileq.telling import progress, tell_models
+from tactileq.printing import print_models, progress
 
 if TYPE_CHECKING:
     from experiments.observers.psychometrics import Psychometrics
@@ -108,7 +108,7 @@ def run_study(
     from experiments.observers.whole_study import simulate_study
     from rig.twin import SimulatedRig
 
-    tell_models(models, plan.textures)
+    print_models(models, plan.textures)
     sessions = sum(task.participants * plan.sessions(name) for name, task in plan.tasks.items())
     with progress("Simulated participants", sessions) as advance:
         simulate_study(

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactileq.keeping import check_own_results
 from tactileq.options import Out
-from tactileq.telling import progress
+from tactileq.own_results import check_own_results
+from tactileq.printing import progress
 from tactileq.workers import working
 
 if TYPE_CHECKING:
@@ -131,11 +131,11 @@ def _write(
         for name, data in atlas_files(found, provenance).items():
             (fresh / name).write_bytes(data)
         seal_folder(fresh, provenance)
-    _tell(margin_table(found))
+    _print(margin_table(found))
     print(f"simulated: {out / 'atlas.html'}")
 
 
-def _tell(margins: pd.DataFrame) -> None:
+def _print(margins: pd.DataFrame) -> None:
     """How far each default is from the nearest edge."""
     for row in margins.to_dict("records"):
         most = "at least " if row["at_least"] else ""

@@ -11,7 +11,7 @@ import typer
 
 from modeling.errors import counted
 from tactileq.options import Out, VibratorFile
-from tactileq.telling import progress
+from tactileq.printing import progress
 
 if TYPE_CHECKING:
     from stimuli.sets.recipe import Recipe
@@ -96,7 +96,7 @@ def recipe_from(
             )
         return Recipe.load(recipes[0])
     models, others = models_among(named)
-    tell_passed_over(others)
+    print_passed_over(others)
     if not models:
         raise ValueError(
             f"expected at least one model, got none in {', '.join(map(str, named))}; give one."
@@ -114,7 +114,7 @@ def recipe_from(
     )
 
 
-def tell_passed_over(others: Sequence[Path]) -> None:
+def print_passed_over(others: Sequence[Path]) -> None:
     """Name the JSON files among models that hold something else."""
     for path in others:
         print(f"note: {path} states that it is not a model and is skipped.")
@@ -128,13 +128,13 @@ def render_stimuli(recipe: Recipe, out: Path, *, inputs: Sequence[Path] = ()) ->
 
     hashes = sha256_of_paths([*inputs, *files_behind(recipe)])
 
-    def tell_origin(folder: Path) -> None:
+    def print_origin(folder: Path) -> None:
         settings = {"recipe": recipe.to_toml()}
         write_provenance(folder / "provenance.json", "stimuli", settings, inputs=hashes)
 
-    sources, count = render_set(recipe, out, finish=tell_origin)
-    tell_passed_over(sources.passed_over)
-    tell_beyond_grid(sources)
+    sources, count = render_set(recipe, out, finish=print_origin)
+    print_passed_over(sources.passed_over)
+    print_beyond_grid(sources)
     print(f"{counted(count, 'file')}: {out / 'manifest.tsv'}")
 
 
@@ -169,7 +169,7 @@ def render_set(
     return sources, count
 
 
-def tell_beyond_grid(sources: Sources) -> None:
+def print_beyond_grid(sources: Sources) -> None:
     """Report where a stimulus goes beyond the recorded grid."""
     for labelled in sources.models:
         model = labelled.model

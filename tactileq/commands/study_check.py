@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from modeling.errors import counted
 from tactileq.options import StudyArgument
-from tactileq.telling import share_of, tell_models
+from tactileq.printing import print_models, share_of
 
 if TYPE_CHECKING:
     from experiments.study.models import ModelSets
@@ -24,10 +24,10 @@ def study_check(path: StudyArgument) -> None:
     print(f"study: {plan.name}, {textures}, SHA-256 {plan.sha256[:12]}…")
     places = ", ".join(f"{name} ({place})" for name, place in plan.models.items())
     print(f"models: one of each texture in {places}")
-    tell_models(sets, plan.textures)
-    _tell_sessions(plan)
-    _tell_balance(plan)
-    _tell_claims(plan)
+    print_models(sets, plan.textures)
+    _print_sessions(plan)
+    _print_balance(plan)
+    _print_claims(plan)
 
 
 def loaded(path: Path) -> tuple[Study, ModelSets, list[Path]]:
@@ -53,7 +53,7 @@ def loaded(path: Path) -> tuple[Study, ModelSets, list[Path]]:
     return plan, sets, [path, *files]
 
 
-def _tell_claims(plan: Study) -> None:
+def _print_claims(plan: Study) -> None:
     from experiments.tasks.page import proof_of_sensitivity
 
     claims = plan.plan.claims
@@ -65,9 +65,9 @@ def _tell_claims(plan: Study) -> None:
         print(f"  {claim.name}: {proof_of_sensitivity(plan, claim)}")
 
 
-def _tell_sessions(plan: Study) -> None:
+def _print_sessions(plan: Study) -> None:
     from experiments.tasks.durations import minutes_of_session, trials_of_session
-    from experiments.tasks.page import told_of_catch_trials
+    from experiments.tasks.page import catch_trials_text
 
     for task, planned in plan.tasks.items():
         training, main = trials_of_session(plan, task)
@@ -78,10 +78,10 @@ def _tell_sessions(plan: Study) -> None:
             f"session; about {minutes_of_session(plan, task)} min per session (an estimate)"
         )
         if planned.catch_trials:
-            print(f"  {told_of_catch_trials(plan, task)}, among the main trials")
+            print(f"  {catch_trials_text(plan, task)}, among the main trials")
 
 
-def _tell_balance(plan: Study) -> None:
+def _print_balance(plan: Study) -> None:
     from experiments.tasks.balance import balance_of
 
     print("balance of the orders (lowest to highest count, of the total):")

@@ -71,7 +71,7 @@ def study_init(
     folders = (models, simplified or models.parent / "simplified")
     textures = _textures_in(folders)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_text(path, _of_models(text, textures, folders, beside=path.parent, seed=seed))
+    write_text(path, _study_with_models(text, textures, folders, beside=path.parent, seed=seed))
     try:
         loaded(path)
     except ValueError:
@@ -107,7 +107,7 @@ def _textures_in(folders: Sequence[Path]) -> list[str]:
     return full
 
 
-def _of_models(
+def _study_with_models(
     text: str, textures: Sequence[str], folders: Sequence[Path], *, beside: Path, seed: int
 ) -> str:
     """The shipped study with these textures: models, trays, and no pairs of others."""

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from tactileq.commands.study_check import loaded
-from tactileq.keeping import note_of_file, write_own_files
 from tactileq.options import StudyArgument
+from tactileq.own_results import note_of_file, write_own_files
 
 
 def study_plan(

@@ -35,12 +35,12 @@ def study_status(data: Data = Path("data"), study: StudyFile = None) -> None:
     Console().print(table_of(progress))
     for task in progress.tasks:
         print(f"{task.task}: {task.complete} of {task.planned} planned sessions complete")
-    tell_made(made)
+    print_made(made)
     for damage in progress.damaged:
         print(f"damaged: {damage}")
 
 
-def tell_made(made: Exported) -> None:
+def print_made(made: Exported) -> None:
     """Name each file that held something else, folders with new ones, and what is damaged."""
     for path in made.changed:
         print(f"corrected from the log: {path}")

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from modeling.errors import counted
-from tactileq.commands.study_status import tell_made
+from tactileq.commands.study_status import print_made
 from tactileq.options import Data
 
 Subject = Annotated[int, typer.Argument(metavar="SUBJECT", min=1, help="Number of the person.")]
@@ -34,7 +34,7 @@ def study_withdraw(
     made = withdraw(data, subject)
     print(f"withdrawn: subject {subject}; {files} deleted, the slot is free")
     print("Copies elsewhere, such as in backups and reports, you have to delete yourself.")
-    tell_made(made)
+    print_made(made)
 
 
 def study_dropout(
@@ -50,7 +50,7 @@ def study_dropout(
     _confirm(f"Give the slot of subject {subject} to somebody else?", yes=yes)
     made = drop_out(data, subject)
     print(f"dropped out: subject {subject}; the data stay, the slot is free")
-    tell_made(made)
+    print_made(made)
 
 
 def _require(data: Path, study: Path | None) -> None:

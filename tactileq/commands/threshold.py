@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from modeling.errors import counted
-from tactileq.keeping import note_of_file, write_own_files
 from tactileq.options import Data
+from tactileq.own_results import note_of_file, write_own_files
 
 
 def threshold(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactileq.keeping import note_of_file, write_own_files
+from tactileq.own_results import note_of_file, write_own_files
 
 if TYPE_CHECKING:
     from analysis.spectra.vibrator import CompensatedVibrator

@@ -16,7 +16,7 @@ import pytest
 
 from tactileq import app, interruption
 from tactileq.interruption import Interrupted, ended_by_signals
-from tactileq.telling import sentence_of
+from tactileq.printing import sentence_of
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])

@@ -16,7 +16,7 @@ from modeling import RecordingSet
 from rig.capture.grid import StrokeGrid
 from rig.capture.input import InputSettings
 from rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
-from tactileq.commands.record_audio import InputOptions, input_from, tell_assumed
+from tactileq.commands.record_audio import InputOptions, input_from, print_assumed
 from tests.rig.waiting import wait_until
 
 ROOT = Path(__file__).parents[2]
@@ -173,7 +173,7 @@ def test_the_accelerometer_of_a_rig_file_gives_way_to_options(tmp_path: Path, ca
     assert input_from(rig, InputOptions()) == InputSettings(50.0, "USB", 2, 44100.0)
     given = InputOptions("other", 1, 48000.0, 8.0)
     assert input_from(rig, given) == InputSettings(8.0, "other", 1, 48000.0)
-    tell_assumed(rig)
+    print_assumed(rig)
     assert "50 g per full scale is assumed (data sheet)" in capsys.readouterr().out
 
 

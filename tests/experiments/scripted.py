@@ -77,8 +77,8 @@ class Ready:
     def ready(self) -> bool:
         return True
 
-    def tell(self, standing: ProgressReport) -> None:
-        self.told.append(standing)
+    def report(self, progress: ProgressReport) -> None:
+        self.told.append(progress)
 
     def page(self, name: str) -> None:
         pass

@@ -67,7 +67,7 @@ def test_labels_and_sentences_are_shown_as_they_stand(desk: Desk) -> None:
     desk.terminal.ask_mount("[b2]")
     desk.terminal.call("expected a port, got [/dev/ttyACM0].")
     problem = "plug [/x] in."
-    desk.terminal.tell(
+    desk.terminal.report(
         ProgressReport(phase="main", done=1, of=2, minutes_left=None, problems=(problem,))
     )
     assert "Tray [b2]:" in desk.shown
@@ -158,5 +158,5 @@ def test_what_failed_is_told_and_confirmed(desk: Desk) -> None:
 def test_how_far_the_session_is_and_how_the_rig_is(
     desk: Desk, standing: ProgressReport, shown: str
 ) -> None:
-    desk.terminal.tell(standing)
+    desk.terminal.report(standing)
     assert desk.shown.strip() == shown

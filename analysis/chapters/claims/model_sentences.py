@@ -37,12 +37,12 @@ def model_methods(responses: Responses, found: Sequence[ClaimFound]) -> list[str
         "participants; its intervals are credible intervals."
     ]
     if any(one.claim.measure in SCALES for one in own):
-        sentences += _of_ratings(RatingPriors())
+        sentences += _rating_sentences(RatingPriors())
     tasks = dict.fromkeys(one.claim.task for one in own if one.claim.measure not in SCALES)
     models = [decision_model(task, responses.answers[task]) for task in tasks]
     for model in dict.fromkeys(models):
         if model is not None:
-            sentences += _of_choices(model, ChoicePriors.of(model))
+            sentences += _choice_sentences(model, ChoicePriors.of(model))
     return [*sentences, _share(), _sampler(own), _rule(responses.plan.few), _beside(own, found)]
 
 
@@ -75,7 +75,7 @@ def _names(found: Sequence[ClaimFound]) -> str:
     return "; ".join(f"“{one.claim.name}”" for one in found)
 
 
-def _of_ratings(priors: RatingPriors) -> list[str]:
+def _rating_sentences(priors: RatingPriors) -> list[str]:
     return [
         "A rating is a latent judgement, normally distributed about the sum of the participant's "
         "level, their deviation for the texture, the texture, the effect of the model and linear "
@@ -97,7 +97,7 @@ def _of_ratings(priors: RatingPriors) -> list[str]:
     ]
 
 
-def _of_choices(model: DecisionModel, priors: ChoicePriors) -> list[str]:
+def _choice_sentences(model: DecisionModel, priors: ChoicePriors) -> list[str]:
     if model.both_models:
         what = "d′ between the two models, in the triangular decision of the odd-one-out task,"
         checks = (

@@ -85,7 +85,7 @@ def reliability_section(
         for scale in SCALES
         if scale in table and table[scale].notna().any()
     ]
-    agreed, raters = _of_ratings(rated)
+    agreed, raters = _agreement(rated)
     careless = careless_signs(given, chances=chances, rng=rng)
     items: list[Item] = _rating_tables(agreed, raters, simulated=simulated) if rated else []
     items.append(_careless_table(careless, simulated=simulated))
@@ -131,7 +131,9 @@ def _scale_words(task: str, scale: str, given: Mapping[str, pd.DataFrame]) -> st
     return SCALES[scale] + f" in the {TASKS[task]}" * (task != first)
 
 
-def _of_ratings(rated: list[tuple[pd.DataFrame, str, str]]) -> tuple[pd.DataFrame, pd.DataFrame]:
+def _agreement(
+    rated: list[tuple[pd.DataFrame, str, str]],
+) -> tuple[pd.DataFrame, pd.DataFrame]:
     agreed = [agreement(table, scale).assign(scale=words) for table, scale, words in rated]
     raters = [rater_table(table, scale).assign(scale=words) for table, scale, words in rated]
     return (

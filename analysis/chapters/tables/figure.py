@@ -51,7 +51,7 @@ def figure_factorial(
     figure = Figure(figsize=size, layout="constrained")
     axes = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
     for ax, panel in zip(axes, panels, strict=False):
-        own = [_of_panel(table, panel) for table in (cells, means)]
+        own = [_panel_rows(table, panel) for table in (cells, means)]
         plot_levels(own[0], own[1], factor=first, levels=levels, simulated=simulated, ax=ax)
         ax.set_title(", ".join(f"{name} {level}" for name, level in panel.items()), loc="left")
     for ax in axes[len(panels) :]:
@@ -111,7 +111,7 @@ def plot_levels(
     return ax
 
 
-def _of_panel(table: pd.DataFrame, panel: Mapping[Hashable, str]) -> pd.DataFrame:
+def _panel_rows(table: pd.DataFrame, panel: Mapping[Hashable, str]) -> pd.DataFrame:
     for name, level in panel.items():
         table = table[table[name] == level]
     return table

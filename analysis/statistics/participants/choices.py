@@ -112,7 +112,7 @@ class ChoiceSampler:
         found: Floats = self._data.catch_right * np.log(p) + wrong * np.log1p(-p)
         return found
 
-    def _of_people(self, cells: Floats) -> Floats:
+    def _by_person(self, cells: Floats) -> Floats:
         found: Floats = np.where(self.attends, cells.sum(axis=(2, 3)), 0.0)
         return found
 
@@ -158,7 +158,7 @@ class ChoiceSampler:
     ) -> None:
         state = replace(self._state, **proposed)
         cells = self._log_cells(state)
-        log = log + self._of_people(cells) - self._of_people(self._cells)
+        log = log + self._by_person(cells) - self._by_person(self._cells)
         yes = self._accepted(log, steps[0] if steps else "")
         for name in steps[1:]:
             self._steps[name] = self._steps[steps[0]] * 0.7
@@ -226,7 +226,7 @@ class ChoiceSampler:
 
     def _judge_study(self, proposed: dict[str, Floats], log: Floats, name: str = "") -> Bools:
         cells = self._log_cells(replace(self._state, **proposed))
-        log = log + (self._of_people(cells) - self._of_people(self._cells)).sum(axis=1)
+        log = log + (self._by_person(cells) - self._by_person(self._cells)).sum(axis=1)
         yes = self._accepted(log, name)
         for key, new in proposed.items():
             old = getattr(self._state, key)
@@ -247,7 +247,7 @@ class ChoiceSampler:
             new[c] += change
             log = 0.5 * (old[c] ** 2 - new[c] ** 2) / self._priors.trend_sd**2
             cells = self._log_cells(replace(self._state, slopes=new))
-            log += (self._of_people(cells) - self._of_people(self._cells)).sum(axis=1)
+            log += (self._by_person(cells) - self._by_person(self._cells)).sum(axis=1)
             yes = self._accepted(log, name)
             self._state = replace(self._state, slopes=np.where(yes, new, old))
             self._cells = np.where(yes[:, None, None, None], cells, self._cells)
@@ -269,7 +269,7 @@ class ChoiceSampler:
         new = np.clip(new, 1e-6, 0.999)
         log = _log_beta(new, self._priors.lapses) - _log_beta(self.lapses, self._priors.lapses)
         cells = self._log_cells(self._state, new)
-        change = self._of_people(cells) - self._of_people(self._cells)
+        change = self._by_person(cells) - self._by_person(self._cells)
         change += self.attends * (
             self._log_catch(new, self._catch) - self._log_catch(self.lapses, self._catch)
         )

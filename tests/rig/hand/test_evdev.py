@@ -199,7 +199,7 @@ def test_a_pens_strokes_become_speed_and_newtons(desk: Desk) -> None:
 def test_a_mouse_has_an_assumed_force_on_every_reading(desk: Desk, live: Live) -> None:
     desk.connect(4, "A Mouse", MOUSE)
     settings = HandSettings(kind="mouse", counts_per_mm=40, assumed_force_n=1.5, grab=True)
-    loop = HandLoop(live, settings, tell=lambda told: None)
+    loop = HandLoop(live, settings, send=lambda told: None)
     loop.open()
     assert (evdev.EVIOCGRAB, 1) in desk.kernel.told
     run_until(loop, lambda: live.readings_written > 20)
@@ -219,7 +219,7 @@ def test_unplugged_it_is_gone_at_once_and_taken_up_again(
     desk.connect(3, "Small Tablet Pen", TABLET)
     told: list[HandFault | Counts | Firmware] = []
     named = HandSettings(kind="tablet", device="Small Tablet Pen", pressure_points=POINTS)
-    loop = HandLoop(live, named, tell=told.append)
+    loop = HandLoop(live, named, send=told.append)
     loop.open()
     desk.send("Small Tablet Pen", (EV_KEY, BTN_TOOL_PEN, 1), (EV_ABS, ABS_X, 600))
     run_until(loop, lambda: live.readings_written > 5)

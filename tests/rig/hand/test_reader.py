@@ -116,7 +116,7 @@ def test_a_request_that_it_does_not_know_is_a_fault_and_it_reads_on(live: Live) 
         wait_until(lambda: moves(live))
         first = reader.pid
         assert reader._child is not None
-        reader._child.tell(Silence())
+        reader._child.send(Silence())
         told = list[str]()
         wait_until(lambda: bool(told.extend(reader.faults()) or told))
         assert ["Silence" in fault for fault in told] == [True]

@@ -363,7 +363,7 @@ def test_the_only_port_is_taken(board: Board, monkeypatch: pytest.MonkeyPatch, l
     port = ConnectedDevice(board.path, "a board", "serial", readable=True)
     monkeypatch.setattr(serial_sensor, "serial_ports", lambda: (port,))
     board.send(at_constant_speed)
-    loop = HandLoop(live, HandSettings(kind="serial"), tell=lambda told: None)
+    loop = HandLoop(live, HandSettings(kind="serial"), send=lambda told: None)
     assert loop.open() == f"serial sensor at {board.path}"
     loop.close()
     assert is_gone(live)

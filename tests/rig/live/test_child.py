@@ -53,7 +53,7 @@ with Parent() as parent:
         raise InputError("expected another setting, got this; change it.")
     if text == "fails":
         raise ValueError("what went wrong")
-    parent.tell(Say(text))
+    parent.send(Say(text))
     parent.serve(Say, answer)
     if text == "lingers":
         time.sleep(60)

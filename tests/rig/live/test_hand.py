@@ -70,7 +70,7 @@ class Sensor:
         device = SerialSensor(self._port)
         monkeypatch.setattr(device, "wait", lambda seconds: None)
         settings = HandSettings(kind="serial", device=path, filter_delay_s=DELAY_S)
-        self._loop = HandLoop(live, settings, tell=lambda told: None, opening=lambda _: device)
+        self._loop = HandLoop(live, settings, send=lambda told: None, opening=lambda _: device)
         self._loop.open()
 
     def arrive(self, number: int, measured_s: float) -> None:

@@ -520,7 +520,7 @@ class Parent:
         assert self.process.stdout is not None
         return self.process.stdout.readline()
 
-    def tell(self, line: str) -> None:
+    def send(self, line: str) -> None:
         assert self.process.stdin is not None
         self.process.stdin.write(line + "\n")
         self.process.stdin.flush()
@@ -585,10 +585,10 @@ def test_a_session_that_is_stopped_or_hangs_leaves_silence_until_it_presents_aga
     assert "poll the rig" in parent.hears()
     rows = wait_for_blocks(parent.live, before, 20)
     assert not rows["peak_g"].any()  # nothing resumes by itself
-    parent.tell("play")
+    parent.send("play")
     wait_until(lambda: parent.live.blocks_since(before)[1]["peak_g"].any())
     before = parent.live.blocks_written
-    parent.tell("hang")
+    parent.send("hang")
     assert parent.hears() == "hangs\n"
     hangs_s = now_s()
     check_halted(parent.blocks_until_silent(before), by_s=hangs_s)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tactileq.telling import progress, share_of
+from tactileq.printing import progress, share_of
 
 
 @pytest.mark.parametrize("name", ["[/b]x", "[red]oak", "a [1]"])

@@ -32,7 +32,7 @@ def sentence_of(error: Exception) -> str:
     return str(error)
 
 
-def tell_warning(message: Warning | str, *where: object, **more: object) -> None:
+def print_warning(message: Warning | str, *where: object, **more: object) -> None:
     """Print a warning as one line, for `warnings.showwarning`."""
     print(f"warning: {message}", file=sys.stderr)
 
@@ -92,10 +92,10 @@ def simulated_note(model: AnyModel) -> str:
     return " (simulated)" if model.simulated else ""
 
 
-def tell_models(sets: ModelSets, textures: Sequence[str]) -> None:
+def print_models(sets: ModelSets, textures: Sequence[str]) -> None:
     """Name textures whose models are identical in two sets, and models from outside the sets.
 
-    Not for an experimenter who has to stay blind; for them use `tell_foreign_models` only.
+    Not for an experimenter who has to stay blind; for them use `print_foreign_models` only.
     """
     for first, second in combinations(sets.names, 2):
         if controls := sets.identical(textures, (first, second)):
@@ -103,10 +103,10 @@ def tell_models(sets: ModelSets, textures: Sequence[str]) -> None:
                 f"note: {first} and {second} are identical for {', '.join(controls)}: a control; "
                 "there is nothing to compare."
             )
-    tell_foreign_models(sets, textures)
+    print_foreign_models(sets, textures)
 
 
-def tell_foreign_models(sets: ModelSets, textures: Sequence[str]) -> None:
+def print_foreign_models(sets: ModelSets, textures: Sequence[str]) -> None:
     """Name models that were made from a model that is in none of the sets."""
     for texture, name in sets.of_others(textures):
         print(
