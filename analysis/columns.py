@@ -14,7 +14,7 @@ ESTIMATOR = Column("estimator", is_name=True)
 LAYER = Column("layer", is_name=True, total=ALL_LAYERS)
 CONDITIONS = Column("conditions")
 P = Column("p", is_p_value=True)
-SIMULATED = Column("simulated")
+SIMULATED_COLUMN = Column("simulated")
 
 
 def tsv_text(table: pd.DataFrame) -> str:

@@ -8,7 +8,7 @@ from modeling.files.answer_tables import ANSWER_TABLES
 
 # The sets of models that the statistics compare, the reference first.
 MODELS = ("full", "simplified")
-TASKS = {task: table.title for task, table in ANSWER_TABLES.items()}
+TASK_TITLES = {task: table.title for task, table in ANSWER_TABLES.items()}
 SCALES: dict[str, str] = {}
 for _column in (column for table in ANSWER_TABLES.values() for column in table.columns):
     if _column.scale and SCALES.setdefault(_column.name, _column.scale) != _column.scale:

@@ -15,7 +15,7 @@ from modeling.arrays import Bools, Floats
 from modeling.files.answer_tables import ENDS
 
 LOWEST, HIGHEST = ENDS
-ALPHA = 1 - CONFIDENCE
+MISS_RATE = 1 - CONFIDENCE  # of intervals, and the level of tests
 
 
 def mean_at_the_end(share: float, *, sd: float) -> float:
@@ -78,6 +78,6 @@ def paired_power(d_z: float, count: float) -> float:
         Participants, > 1; whole numbers are meant, others lie between.
     """
     shift = d_z * np.sqrt(count)
-    limit = stats.t.isf(ALPHA / 2, count - 1)
+    limit = stats.t.isf(MISS_RATE / 2, count - 1)
     tails = stats.nct.sf(limit, count - 1, shift) + stats.nct.cdf(-limit, count - 1, shift)
     return float(tails)

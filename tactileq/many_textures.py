@@ -335,7 +335,7 @@ def _sources_in(folders: Iterable[Path]) -> tuple[list[TextureSource], list[Text
 
 def _require_own_files(sources: Iterable[TextureSource], out: Path) -> None:
     """Refuse textures whose files would overwrite each other's or another command's."""
-    from analysis.spectra.findings import ENDINGS
+    from analysis.spectra.findings import FILE_ENDINGS
 
     taken: dict[Path, TextureSource] = {}
     for source in sources:
@@ -349,7 +349,7 @@ def _require_own_files(sources: Iterable[TextureSource], out: Path) -> None:
             )
         taken[start] = source
         check_own_files(
-            [Path(f"{start}{ending}") for ending in ENDINGS],
+            [Path(f"{start}{ending}") for ending in FILE_ENDINGS],
             Path(f"{start}_provenance.json"),
             command="model",
             texture=source.texture,

@@ -20,18 +20,15 @@ from experiments.tasks.threshold_table import READ, read_answers
 from modeling import InputError, RecordingSet, Threshold
 from modeling.files.answer_tables import ANSWER_TABLES, PARTICIPANT_COLUMNS, PARTICIPANT_ID
 from modeling.files.columns import ABOVE_0, Column, Columns, markdown, names, sidecar, without
-from modeling.files.stimulus_table import COLUMNS as MANIFEST_COLUMNS
+from modeling.files.stimulus_table import STIMULUS_COLUMNS as MANIFEST_COLUMNS
 from modeling.files.tables import Row, read_table, table_text
-from modeling.perception.thresholds import COLUMNS as THRESHOLD_COLUMNS
+from modeling.perception.thresholds import THRESHOLD_COLUMNS
 from modeling.recordings.recording_set import KNOWN_COLUMNS
-from modeling.recordings.trajectory import COLUMNS as TRAJECTORY_COLUMNS
-from modeling.recordings.trajectory import load_trajectory
-from modeling.scenes.microcontrollers import COLUMNS as CONTROLLER_COLUMNS
-from modeling.scenes.microcontrollers import load_microcontrollers
+from modeling.recordings.trajectory import TRAJECTORY_COLUMNS, load_trajectory
+from modeling.scenes.microcontrollers import CONTROLLER_COLUMNS, load_microcontrollers
 from rig.capture.grid import StrokeGrid
-from rig.capture.pieces import COLUMNS as PIECE_COLUMNS
-from rig.capture.pieces import PieceStore, Plan
-from rig.hand.scripted import COLUMNS as SCRIPT_COLUMNS
+from rig.capture.pieces import PIECE_COLUMNS, PieceStore, Plan
+from rig.hand.scripted import SCRIPT_COLUMNS
 from rig.hand.scripted import ScriptedTrajectory as Script
 from rig.importing.labels import LABEL_COLUMNS, labels_from_table
 from rig.sound.signals import OF_SURFACES, stimuli_of_surfaces

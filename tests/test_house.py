@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import pkgutil
 import re
 from importlib import import_module
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
+ROOMS = ("modeling", "stimuli", "rig", "experiments", "analysis", "benches", "tactileq")
 
 
 def test_every_command_has_an_example() -> None:
@@ -70,18 +72,7 @@ def test_pages_have_no_gaps_and_point_at_what_exists(name: str) -> None:
 
 def test_every_cited_page_and_anchor_of_the_method_exists() -> None:
     cited: set[str] = set()
-    rooms = (
-        "modeling",
-        "stimuli",
-        "rig",
-        "experiments",
-        "analysis",
-        "benches",
-        "tactileq",
-        "tests",
-        "docs",
-    )
-    for path in (p for room in (*rooms, "tests", "docs") for p in (ROOT / room).rglob("*.*")):
+    for path in (p for room in (*ROOMS, "tests", "docs") for p in (ROOT / room).rglob("*.*")):
         if path.suffix in (".py", ".h", ".c", ".toml"):
             text = path.read_text(encoding="utf-8")
             cited |= set(re.findall(r"docs/method[\w./#-]*\w", text))
@@ -108,3 +99,50 @@ def test_files_and_names_that_pages_mention_exist(name: str) -> None:
             if not hasattr(found, part):
                 import_module(".".join(dotted.split(".")[: depth + 1]))  # a module, or an error
             found = getattr(found, part)
+
+
+def constants_of(module: ast.Module) -> dict[str, str]:
+    """The public constants of a module, with the code of their values."""
+    found = {}
+    for node in module.body:
+        targets = node.targets if isinstance(node, ast.Assign) else []
+        if isinstance(node, ast.AnnAssign) and node.value is not None:
+            targets = [node.target]
+        for target in targets:
+            if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
+                pairs = list(zip(target.elts, node.value.elts, strict=True))
+            else:
+                pairs = [(each, node.value) for each in ast.walk(target)]
+            found |= {
+                name.id: ast.unparse(value)
+                for name, value in pairs
+                if isinstance(name, ast.Name) and name.id.isupper() and name.id[0] != "_"
+            }
+    return found
+
+
+def test_a_public_class_and_an_imported_constant_stand_for_one_thing() -> None:
+    """No two modules define a class of one name; a constant that two of them give others is one."""
+    modules = {}
+    for room in ROOMS:
+        for path in (ROOT / room).rglob("*.py"):
+            name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+            modules[name] = ast.parse(path.read_text("utf-8"))
+    assert len(modules) > 400
+    classes: dict[str, list[str]] = {}
+    for name, module in modules.items():
+        for node in module.body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                classes.setdefault(node.name, []).append(name)
+    assert {name: homes for name, homes in classes.items() if len(homes) > 1} == {}
+    constants = {name: constants_of(module) for name, module in modules.items()}
+    given: dict[str, dict[str, str]] = {}
+    for module in modules.values():
+        for node in ast.walk(module):
+            if isinstance(node, ast.ImportFrom) and node.module in constants:
+                own = constants[node.module]
+                for one in node.names:
+                    if one.name in own:
+                        given.setdefault(one.name, {})[node.module] = own[one.name]
+    assert len(given) > 200
+    assert {name: homes for name, homes in given.items() if len(set(homes.values())) > 1} == {}

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from analysis.answers.responses import Responses
-from analysis.labels import TASKS
+from analysis.labels import TASK_TITLES
 from analysis.report.report import write_report
 from analysis.statistics.rates import UNKNOWN_CHANCE
 from experiments.study.study import Study
@@ -63,7 +63,7 @@ def test_the_last_step_names_the_tables_of_a_task(tmp_path: Path, monkeypatch) -
     """Those of a task like the forced choice that is not the first of its kind."""
     again = replace(ANSWER_TABLES["relative"], title="choice once more")
     monkeypatch.setitem(ANSWER_TABLES, "again", again)
-    monkeypatch.setitem(TASKS, "again", again.title)
+    monkeypatch.setitem(TASK_TITLES, "again", again.title)
     answers = {"again": choice_table(np.random.default_rng(1), people=8, repeats=1)}
     responses = Responses(answers, simulated_participants=True, simulated_rig=True)
     write_report(tmp_path / "report.html", responses=responses)

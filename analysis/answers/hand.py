@@ -23,8 +23,8 @@ from modeling.files.columns import Column, names
 from modeling.files.documents import read_json_object
 from modeling.files.reading import read_bytes
 
-MEASURES = ("speed_mm_s", "force_n", "contact_s", "presentations")
-HAND_COLUMNS = (
+HAND_MEASURES = ("speed_mm_s", "force_n", "contact_s", "presentations")
+HAND_TABLE_COLUMNS = (
     Column("task", is_name=True),
     Column("participant_id", "participant", is_name=True),
     TEXTURE,
@@ -60,7 +60,7 @@ def load_hand(data_folder: str | Path, answers: Mapping[str, pd.DataFrame]) -> p
     Returns
     -------
     DataFrame
-        `HAND_COLUMNS`, a row per task whose trials have virtual surfaces of one model alone,
+        `HAND_TABLE_COLUMNS`, a row per task whose trials have virtual surfaces of one model alone,
         participant, texture and model with means over its trials: of the speed (without its sign)
         and the measured force while touching a virtual surface, of the time in contact, and of the
         number of presentations of virtual surfaces. NaN where nothing measured it or the session
@@ -82,13 +82,13 @@ def load_hand(data_folder: str | Path, answers: Mapping[str, pd.DataFrame]) -> p
             of_session = _session_table(beh / f"{participant}_{session}_task-{task}", own)
             trials.append(of_session.assign(task=task))
     if not trials:
-        return pd.DataFrame(columns=names(HAND_COLUMNS))
+        return pd.DataFrame(columns=names(HAND_TABLE_COLUMNS))
     every = pd.concat(trials, ignore_index=True)
-    if every[list(MEASURES)].isna().to_numpy().all():
-        return pd.DataFrame(columns=names(HAND_COLUMNS))
+    if every[list(HAND_MEASURES)].isna().to_numpy().all():
+        return pd.DataFrame(columns=names(HAND_TABLE_COLUMNS))
     cells = every.groupby(["task", "participant_id", "texture", "model"], sort=False)
-    means = cells[list(MEASURES)].mean()
-    return means.assign(trials=cells.size()).reset_index()[names(HAND_COLUMNS)]
+    means = cells[list(HAND_MEASURES)].mean()
+    return means.assign(trials=cells.size()).reset_index()[names(HAND_TABLE_COLUMNS)]
 
 
 def _session_table(stem: Path, answers: pd.DataFrame) -> pd.DataFrame:

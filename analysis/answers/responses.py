@@ -12,7 +12,7 @@ from analysis.labels import MODELS
 from modeling.errors import InputError, shown
 from modeling.files.answer_tables import ANSWER_TABLES
 
-BETWEEN = "/"  # a set-up's name and a participant's: leipzig/sub-01
+SETUP_SEPARATOR = "/"  # a set-up's name and a participant's: leipzig/sub-01
 
 
 @dataclass(frozen=True)
@@ -250,5 +250,5 @@ def stands_apart(table: pd.DataFrame, task: str) -> pd.Series:
 
 def setup_of(participants: pd.Series) -> pd.Series:
     """The set-up before each participant's name; empty where there is only one."""
-    parts = participants.str.split(BETWEEN, n=1)
+    parts = participants.str.split(SETUP_SEPARATOR, n=1)
     return parts.map(lambda found: found[0] if len(found) > 1 else "")

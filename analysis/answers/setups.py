@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pandas as pd
 
-from analysis.answers.responses import BETWEEN, Responses
+from analysis.answers.responses import SETUP_SEPARATOR, Responses
 from modeling import InputError
 from modeling.errors import shown
 
@@ -33,8 +33,10 @@ def pool_setups(setups: Mapping[str, Responses]) -> Responses:
     """
     first = next(iter(setups.values()))
     for name, one in setups.items():
-        if not name or BETWEEN in name:
-            raise InputError(f"expected a name without {BETWEEN} for a set-up, got {shown(name)}.")
+        if not name or SETUP_SEPARATOR in name:
+            raise InputError(
+                f"expected a name without {SETUP_SEPARATOR} for a set-up, got {shown(name)}."
+            )
         _check_alike(first, one, name)
     groups = {t: tuple(known) for one in setups.values() for t, known in one.equal.items()}
     planned = {
@@ -70,21 +72,25 @@ def pool_setups(setups: Mapping[str, Responses]) -> Responses:
 
 def _named(people: Mapping[str, Iterable[str]]) -> frozenset[str]:
     """Participants of all set-ups, named after theirs."""
-    return frozenset(f"{setup}{BETWEEN}{who}" for setup, all_ in people.items() for who in all_)
+    return frozenset(
+        f"{setup}{SETUP_SEPARATOR}{who}" for setup, all_ in people.items() for who in all_
+    )
 
 
 def named_after(setup: str, table: pd.DataFrame) -> pd.DataFrame:
     """The table with its participants named after their set-up; as it is without a name."""
     if not setup:
         return table
-    return table.assign(participant_id=setup + BETWEEN + table["participant_id"].astype(str))
+    return table.assign(
+        participant_id=setup + SETUP_SEPARATOR + table["participant_id"].astype(str)
+    )
 
 
 def answers_at(setup: str, tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
     """The rows of one set-up with its own names of participants; all without a set-up's name."""
     if not setup:
         return dict(tables)
-    before = setup + BETWEEN
+    before = setup + SETUP_SEPARATOR
     own = {t: table[table["participant_id"].str.startswith(before)] for t, table in tables.items()}
     return {
         task: table.assign(participant_id=table["participant_id"].str.removeprefix(before))

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.answers.responses import Responses
-from analysis.labels import MODELS, TASKS, sentence_case
+from analysis.labels import MODELS, TASK_TITLES, sentence_case
 from analysis.page.sections import Section
 from analysis.statistics.verdicts import ClaimFound
 from analysis.textures.results import TextureResult
@@ -171,7 +171,7 @@ ModelChapter = Callable[[Modelled], Sequence[Section]]
 
 def who_took_part(responses: Responses, task: str) -> tuple[str, tuple[str, str]]:
     """The sentence and the tile with the number of participants, out of those planned."""
-    where = TASKS[task]
+    where = TASK_TITLES[task]
     done, planned = responses.done(task), responses.planned.get(task)
     people = str(done.participants)
     kind = "simulated participant" if responses.simulated_participants else "participant"

@@ -10,7 +10,7 @@ import pandas as pd
 
 from modeling.arrays import Bools, Floats
 from modeling.files.folders import listed_file
-from modeling.files.stimulus_table import COLUMNS, MANIFEST
+from modeling.files.stimulus_table import MANIFEST, STIMULUS_COLUMNS
 from modeling.files.tables import read_table
 from stimuli.sets.manifest import COMPENSATED
 from stimuli.sets.recipe import Recipe
@@ -68,7 +68,7 @@ def contact_sheet(folder: str | Path) -> ContactSheet:
         A set that `stimuli.sets.writing.write_set` has written.
     """
     place = Path(folder)
-    manifest = pd.DataFrame(read_table(place / MANIFEST, COLUMNS))
+    manifest = pd.DataFrame(read_table(place / MANIFEST, STIMULUS_COLUMNS))
     chosen = manifest[manifest["rate_hz"] == manifest["rate_hz"].min()]
     names = [tuple(dict.fromkeys(chosen[column])) for column in _NAMES]
     rate_hz = int(chosen["rate_hz"].iloc[0])

@@ -26,7 +26,7 @@ from modeling.fitting.conditions import only_unit, recording_spectra
 from modeling.fitting.texture import fit_spectra
 
 # Endings of the files with the findings from one texture's recordings.
-ENDINGS = (
+FILE_ENDINGS = (
     ".json",
     "_layers.tsv",
     "_spectra.tsv",
@@ -130,7 +130,7 @@ def findings_files(found: Findings, *, plot: bool) -> dict[str, bytes]:
     Returns
     -------
     dict of str to bytes
-        By the ending of the file's name, of `ENDINGS`.
+        By the ending of the file's name, of `FILE_ENDINGS`.
     """
     tables = {"spectra": spectra_table(found.measured)}
     if found.model is not None:

@@ -12,7 +12,7 @@ import pandas as pd
 
 from analysis.answers.plan import DIFFERENCE, Claim
 from analysis.answers.responses import Responses
-from analysis.labels import MEASURES, MODELS, SCALES, TASKS
+from analysis.labels import MEASURES, MODELS, SCALES, TASK_TITLES
 from analysis.statistics.claims import (
     Values,
     complete_means,
@@ -74,7 +74,7 @@ def _exploratory_name(
     """
     first = next(other for other in begun if measure in ANSWER_TABLES[other].measures)
     words = [MEASURES[measure], *pair[1:] * (pair != MODELS)]
-    return " ".join([*words, *[f"of the {TASKS[task]}"] * (task != first)])
+    return " ".join([*words, *[f"of the {TASK_TITLES[task]}"] * (task != first)])
 
 
 def pairs_of(responses: Responses, task: str) -> list[tuple[str, str]]:

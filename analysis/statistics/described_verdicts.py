@@ -9,7 +9,7 @@ import pandas as pd
 
 from analysis.answers.responses import Responses, setup_of
 from analysis.columns import TEXTURE
-from analysis.labels import TASKS
+from analysis.labels import TASK_TITLES
 from analysis.statistics.caveats import DIFFERENCES, EQUALITY, Caveats
 from analysis.statistics.claims import CONTROL
 from analysis.statistics.compared_answers import (
@@ -125,7 +125,7 @@ def check_complete(responses: Responses) -> None:
         values = claim_values(responses, claim).table
         one = ClaimFound(claim=claim, tests=pd.DataFrame(), values=values, caveats=caveats)
         for participant, texture in incomplete(one):
-            lacking.setdefault(participant, {})[f"{TASKS[claim.task]} of {texture}"] = None
+            lacking.setdefault(participant, {})[f"{TASK_TITLES[claim.task]} of {texture}"] = None
     if not lacking:
         return
     (who, what), *others = lacking.items()

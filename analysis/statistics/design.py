@@ -16,7 +16,11 @@ from analysis.statistics.paired import participant_means
 from modeling.arrays import Floats
 from modeling.errors import counted
 
-MODEL, SESSION, ORDER = "model, other to reference", "each further session", "first to last trial"
+MODEL_EFFECT, SESSION, ORDER = (
+    "model, other to reference",
+    "each further session",
+    "first to last trial",
+)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -86,7 +90,7 @@ def design(answers: pd.DataFrame, column: str, *, models: tuple[str, str]) -> De
     # Sum coding: what is left of the model is its mean over textures.
     apart = textures[:, :-1] - textures[:, -1:]
     columns = [model, np.ones(len(own)), *apart.T, *(model[:, None] * apart).T]
-    terms = {MODEL: 0}
+    terms = {MODEL_EFFECT: 0}
     for name, covariate in ((SESSION, _sessions(own)), (ORDER, _order(own))):
         if len(covariate) and np.ptp(covariate) > 0:
             terms[name] = len(columns)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from analysis.columns import P
-from analysis.statistics.design import MODEL, complete_participants, design
+from analysis.statistics.design import MODEL_EFFECT, complete_participants, design
 from analysis.statistics.paired import CONFIDENCE, paired_test
 from modeling.arrays import Floats
 from modeling.files.columns import Column, names
@@ -192,7 +192,7 @@ def mixed_effects(
     rows = []
     for term, place in built.terms.items():
         row = {"term": term, "estimate": fit.estimates[place], "se": fit.errors[place], "note": ""}
-        if term == MODEL:
+        if term == MODEL_EFFECT:
             row |= t_of(fit.estimates[place], fit.errors[place], n=built.participants)
             row |= {name: getattr(fit, name) for name in _SPREADS}
         rows.append(row | shared)
@@ -226,7 +226,7 @@ def _paired(
     shown = {name: getattr(test, name) for name in ("n", "ci_low", "ci_high", "t", "df", "p")}
     se = abs(test.mean_difference / test.t) if test.t else np.nan
     return {
-        "term": MODEL,
+        "term": MODEL_EFFECT,
         "method": PAIRED,
         "estimate": test.mean_difference,
         "se": se,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from analysis.columns import CONDITIONS, SIMULATED, TEXTURE, P
+from analysis.columns import CONDITIONS, SIMULATED_COLUMN, TEXTURE, P
 from analysis.labels import ALL_TEXTURES, significance_mark
 from analysis.textures.likeness import MEASURE_COLUMNS, ConditionTarget, likeness_table
 from modeling import RegressedModel, TextureModel, regressed
@@ -93,7 +93,7 @@ REGRESSION_COLUMNS = (
     *FIT_COLUMNS,
     Column("reduced", is_name=True),
     Column("reduced_adjusted_r_squared", "adjusted R², reduced"),
-    SIMULATED,
+    SIMULATED_COLUMN,
 )
 
 
@@ -273,7 +273,7 @@ CENTROID_COLUMNS = (
     AMPLITUDE_R,
     P_AMPLITUDE,
     Column("mark_amplitude", "mark"),
-    SIMULATED,
+    SIMULATED_COLUMN,
 )
 
 
@@ -313,7 +313,15 @@ def centroid_table(models: Sequence[TextureModel]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-CENTROID_AMPLITUDE_COLUMNS = (TEXTURE, PEAK, AMPLITUDE_R, P_AMPLITUDE, MARK, CONDITIONS, SIMULATED)
+CENTROID_AMPLITUDE_COLUMNS = (
+    TEXTURE,
+    PEAK,
+    AMPLITUDE_R,
+    P_AMPLITUDE,
+    MARK,
+    CONDITIONS,
+    SIMULATED_COLUMN,
+)
 
 
 def centroid_amplitude_table(models: Sequence[TextureModel]) -> pd.DataFrame:

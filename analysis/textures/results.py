@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field, fields
 import numpy as np
 import pandas as pd
 
-from analysis.columns import LAYER, SIMULATED, TEXTURE
+from analysis.columns import LAYER, SIMULATED_COLUMN, TEXTURE
 from modeling import InputError, LayerVerdict, RecordingSet, Simplification, Spectrum, TextureModel
 from modeling.errors import shown
 from modeling.files.columns import Column
@@ -73,7 +73,7 @@ class TextureResult:
         return spectra[0][1]
 
 
-VERDICT_COLUMNS = (
+LAYER_VERDICT_COLUMNS = (
     TEXTURE,
     LAYER,
     Column("verdict", is_name=True),
@@ -85,7 +85,7 @@ VERDICT_COLUMNS = (
     Column("flip_probability", is_p_value=True),
     Column("assumed"),
     Column("fills"),
-    SIMULATED,
+    SIMULATED_COLUMN,
     Column("full_sha256", "SHA-256 of the full model"),
     Column("threshold_sha256", "SHA-256 of the threshold"),
 )
@@ -115,7 +115,7 @@ def simplification_table(simplification: Simplification) -> pd.DataFrame:
     )
 
 
-FIT_COLUMNS = (
+MODEL_FIT_COLUMNS = (
     TEXTURE,
     Column("layers"),
     Column("distance_db", "expected distance at conditions", "dB"),
@@ -123,7 +123,7 @@ FIT_COLUMNS = (
     Column("blend_defect_db", "largest blend defect", "dB"),
     Column("by_layers", "with other numbers of layers"),
     Column("warnings"),
-    SIMULATED,
+    SIMULATED_COLUMN,
 )
 
 
@@ -150,7 +150,7 @@ def fit_table(results: Sequence[TextureResult]) -> pd.DataFrame:
         for result in results
         if (fit := result.model.fit) is not None
     ]
-    return pd.DataFrame(rows, columns=[column.name for column in FIT_COLUMNS])
+    return pd.DataFrame(rows, columns=[column.name for column in MODEL_FIT_COLUMNS])
 
 
 def reference_condition(result: TextureResult) -> tuple[float, float]:

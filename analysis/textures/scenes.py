@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.columns import SIMULATED, TEXTURE
+from analysis.columns import SIMULATED_COLUMN, TEXTURE
 from analysis.labels import ALL_TEXTURES
 from modeling import CompiledScene
 from modeling.files.columns import Column, names
@@ -49,7 +49,7 @@ BEFORE_AFTER_COLUMNS = (
     ),
     Column("full_sha256", "SHA-256 of the full model", is_hash=True),
     Column("scene_sha256", "SHA-256 of the scene", is_hash=True),
-    SIMULATED,
+    SIMULATED_COLUMN,
 )
 STEP_COLUMNS = (
     TEXTURE,
@@ -59,7 +59,7 @@ STEP_COLUMNS = (
     Column("bytes"),
     Column("operations", "operations per sample", format=".1f"),
     Column("share", "share of the bound", format=".2f"),
-    SIMULATED,
+    SIMULATED_COLUMN,
 )
 SHARED = "shared between textures"
 

@@ -23,8 +23,8 @@ from analysis.statistics.paired import (
 )
 from benches.atlas.case import Axis, Case
 from benches.raters import (
-    ALPHA,
     HIGHEST,
+    MISS_RATE,
     at_random,
     bootstrap_covers,
     covered,
@@ -86,7 +86,7 @@ def wilcoxon_p(differences: Floats) -> Floats:
 
 def _found(test: Test, full: Floats, simplified: Floats) -> float:
     """Share of the studies with a significant difference; an undefined test finds none."""
-    return float((test(without_rounding_noise(simplified - full)) < ALPHA).mean())
+    return float((test(without_rounding_noise(simplified - full)) < MISS_RATE).mean())
 
 
 def power_lost_at_the_end(share: float, column: float, *, full: bool, test: Test) -> float:
@@ -213,12 +213,12 @@ def fewest_for_t(column: float) -> float:
 
 def fewest_for_ranks(column: float) -> float:
     """With n signs all alike p is 2/2ⁿ, never below 5 % for five or fewer."""
-    return float(np.log2(2 / ALPHA))
+    return float(np.log2(2 / MISS_RATE))
 
 
 def fewest_for_the_bootstrap(column: float) -> float:
     """Resampled means have √((n−1)/n) of the standard error, and normal tails instead of t's."""
-    normal = stats.norm.isf(ALPHA / 2)
+    normal = stats.norm.isf(MISS_RATE / 2)
 
     def surplus(count: float) -> float:
         limit = normal * np.sqrt((count - 1) / count)

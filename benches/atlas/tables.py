@@ -9,7 +9,7 @@ from itertools import groupby
 import numpy as np
 import pandas as pd
 
-from analysis.columns import SIMULATED
+from analysis.columns import SIMULATED_COLUMN
 from benches.atlas.case import HOLDS, Axis
 from benches.atlas.edges import Examined
 from modeling.files.columns import Column
@@ -37,7 +37,7 @@ CELL_COLUMNS = (
     Column("figure", format=".3g"),
     Column("figure_unit", "its unit"),
     Column("verdict"),
-    SIMULATED,
+    SIMULATED_COLUMN,
 )
 EDGE_COLUMNS = (
     _FAMILY,
@@ -55,7 +55,7 @@ EDGE_COLUMNS = (
     Column("returns", "holds again beyond"),
     Column("runs"),
     Column("source", "theory from"),
-    SIMULATED,
+    SIMULATED_COLUMN,
 )
 MARGIN_COLUMNS = (
     _FAMILY,
@@ -71,7 +71,7 @@ MARGIN_COLUMNS = (
     Column("at_least", "no edge found"),
     Column("enough", f"{LEAST_MARGIN:g} or more"),
     Column("exception", "why it is less"),
-    SIMULATED,
+    SIMULATED_COLUMN,
 )
 
 

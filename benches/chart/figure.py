@@ -32,7 +32,7 @@ from benches.chart.methods import (
     GRAINS,
     LOOPS,
     METHODS,
-    OURS,
+    OUR_METHOD,
     POLE_ZERO,
     SHAPED,
     TRUTH,
@@ -58,7 +58,7 @@ STYLES: dict[str, tuple[str, str, bool]] = {
     LOADED: (BLACK, "h", False),
 }
 SHORT = {
-    OURS: "joint",
+    OUR_METHOD: "joint",
     "paper-consistent": "consistent",
     "simplified, energy": "energy",
     "simplified, paper-fft": "fft",
@@ -187,7 +187,7 @@ def _name_points(usual: pd.DataFrame, cost: str, error: str, *, ax: Axes) -> Non
     """One name for methods that coincide; ours below its marker, all others above."""
     known = usual[usual[cost].gt(0) & usual[error].gt(0)]
     for _, here in known.groupby([cost, error], sort=False):
-        ours = (here["family"] == OURS).any()
+        ours = (here["family"] == OUR_METHOD).any()
         ax.annotate(
             ", ".join(map(_short, here["method"])),
             (here[cost].iloc[0], here[error].iloc[0]),

@@ -30,7 +30,7 @@ from modeling.perception.verdicts import CRITERIA, CriterionName
 from modeling.recordings.recording import Recording
 from modeling.recordings.spectrum import mean_spectrum, smooth
 
-OURS, TRUTH, WHITE = "joint", "truth", "white noise"
+OUR_METHOD, TRUTH, WHITE = "joint", "truth", "white noise"
 MOST_LAYERS = 8
 ORDERS = (6, 12, 20, 40)
 BLOCKS_S = {"1/16 s": 1 / 16, "1/4 s": 1 / 4}
@@ -254,7 +254,7 @@ _LOOPS = {
 
 
 def _methods() -> Iterable[Method]:
-    yield Method(OURS, "joint", _joint)
+    yield Method(OUR_METHOD, "joint", _joint)
     for count in range(1, MOST_LAYERS + 1):
         name = f"joint, {counted(count, 'layer')}"
         yield Method(name, "joint, given layers", partial(_layers, count=count))
@@ -352,7 +352,7 @@ def fit_method(name: str, subject: Subject) -> Fit:
         Where the method cannot model this texture.
     """
     method = METHODS[name]
-    before = subject.joint_seconds if method.derived or name == OURS else 0.0
+    before = subject.joint_seconds if method.derived or name == OUR_METHOD else 0.0
     start = process_time()
     fitted = method.fit(subject)
     return Fit(name, method.family, fitted, before + process_time() - start)

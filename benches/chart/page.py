@@ -27,12 +27,12 @@ from benches.chart.chart import Chart
 from benches.chart.figure import STYLES, figure_chart
 from benches.chart.judging import PLACES
 from benches.chart.summary import (
-    COMPARISON_COLUMNS,
     METHOD_COLUMNS,
+    RIVAL_COMPARISON_COLUMNS,
     comparison_table,
     default_rows,
 )
-from benches.chart.surfaces import KINDS, counted_kind
+from benches.chart.surfaces import SURFACE_KINDS, counted_kind
 from modeling.files.columns import names, without
 
 COSTS = (
@@ -77,7 +77,7 @@ _SYMBOLS = {
 FIRST_MEASURE = "stroking_distance_db"
 
 SHOWN_COMPARISONS = without(
-    COMPARISON_COLUMNS,
+    RIVAL_COMPARISON_COLUMNS,
     *(
         "operations_low",
         "operations_high",
@@ -140,7 +140,7 @@ def chart_pictures(chart: Chart) -> tuple[Picture, ...]:
     return tuple(
         Picture(
             f"chart_{kind}",
-            f"Speed against accuracy: {KINDS[kind]}",
+            f"Speed against accuracy: {SURFACE_KINDS[kind]}",
             "Farther left is cheaper, lower is closer to the truth. The black line connects the "
             "variants that no other variant beats in both. How to read the chart: docs/chart.md.",
             figure_chart(chart, kind),
@@ -194,7 +194,7 @@ def _page(chart: Chart, pictures: str) -> str:
     comparison, methods = chart_tables(chart)
     compared = grouped(
         {
-            f"On {KINDS[kind]}": [c.sentence for c in chart.comparisons if c.kind == kind]
+            f"On {SURFACE_KINDS[kind]}": [c.sentence for c in chart.comparisons if c.kind == kind]
             for kind in chart.kinds
         }
     )
@@ -218,7 +218,7 @@ def _page(chart: Chart, pictures: str) -> str:
 
 
 def _interactive(chart: Chart) -> str:
-    kinds = [(kind, KINDS[kind]) for kind in chart.kinds]
+    kinds = [(kind, SURFACE_KINDS[kind]) for kind in chart.kinds]
     data = json.dumps(_data(chart), allow_nan=False).replace("</", "<\\/")
     script = resources.files("benches.chart").joinpath("chart_page.js")
     return (

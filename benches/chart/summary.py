@@ -12,7 +12,7 @@ from scipy.special import stdtrit
 
 from benches.chart.judging import AT, BETWEEN, DOUBLE, PLACES, STROKING, UPDATES_MS
 from benches.chart.measures import SUMMARIES
-from benches.chart.methods import OUR_FAMILIES, OURS, RIVALS
+from benches.chart.methods import OUR_FAMILIES, OUR_METHOD, RIVALS
 from modeling.arrays import Bools, Floats
 from modeling.files.columns import Column, Columns, names
 from modeling.models.texture_model import BLENDINGS
@@ -257,7 +257,7 @@ def comparisons(rows: pd.DataFrame) -> list[RivalComparison]:
     cases = by_surface.mean(numeric_only=True).reset_index()
     for kind, of_kind in cases.groupby("kind", sort=False):
         default = default_rows(of_kind)
-        mine = default[default["method"] == OURS].set_index("surface")
+        mine = default[default["method"] == OUR_METHOD].set_index("surface")
         for rival in RIVALS:
             other = default[default["method"] == rival].set_index("surface")
             if len(mine.index.intersection(other.index)):
@@ -272,7 +272,7 @@ def _comparison(
     pair = _paired(other, mine)
     theirs = of_kind[of_kind["method"] == rival]
     dominated = _dominated(theirs, by=of_kind[of_kind["family"].isin(OUR_FAMILIES)])
-    dominates = _dominated(of_kind[of_kind["method"] == OURS], by=theirs)
+    dominates = _dominated(of_kind[of_kind["method"] == OUR_METHOD], by=theirs)
     between = f"{BETWEEN}_distance_db"
     return RivalComparison(
         kind=kind,
@@ -368,7 +368,7 @@ def _ratio_columns(name: str, label: str) -> Columns:
     return Column(name, label), Column(f"{name}_low", "95% CI from"), Column(f"{name}_high", "to")
 
 
-COMPARISON_COLUMNS: Columns = (
+RIVAL_COMPARISON_COLUMNS: Columns = (
     Column("kind", "surfaces", is_name=True),
     Column("rival", is_name=True),
     Column("surfaces", "number of surfaces"),
@@ -392,4 +392,4 @@ def comparison_table(found: Sequence[RivalComparison]) -> pd.DataFrame:
         values = [value for name in _COMPARED for value in one.ratios[name]]
         words = (one.ahead, one.verdict, one.sentence)
         rows.append((one.kind, one.rival, one.surfaces, *values, *words))
-    return pd.DataFrame(rows, columns=names(COMPARISON_COLUMNS))
+    return pd.DataFrame(rows, columns=names(RIVAL_COMPARISON_COLUMNS))

@@ -34,7 +34,7 @@ from stimuli.planted.textures import (
 )
 
 Kind = Literal["drawn", "planted", "toolkit", "recorded"]
-KINDS: dict[Kind, str] = {
+SURFACE_KINDS: dict[Kind, str] = {
     "drawn": "surfaces drawn from the statistics of 100 real ones (simulated)",
     "planted": "planted textures (simulated)",
     "toolkit": "models of the Penn Haptic Texture Toolkit (simulated recordings)",
@@ -52,7 +52,7 @@ RECORD_S = 1.0
 
 def counted_kind(count: int, kind: Kind) -> str:
     """A number of surfaces of a kind: `1 planted texture (simulated)`."""
-    return counted(count, _ONE_OF[kind], KINDS[kind])
+    return counted(count, _ONE_OF[kind], SURFACE_KINDS[kind])
 
 
 # A stroke over half of which filters are judged; it starts from rest, where no slope is known.
@@ -231,8 +231,8 @@ class Simulated:
 
 
 USUAL = Simulated(4, ("canvas",))
-FULL = Simulated(40, TEXTURES)
-FEW = Simulated(3, ())
+ALL_SURFACES = Simulated(40, TEXTURES)
+FEW_SURFACES = Simulated(3, ())
 
 
 def simulated_sources(which: Simulated) -> list[Origin]:

@@ -24,9 +24,9 @@ from benches.rendering.coefficients import tabled_predictor
 from benches.rendering.rivals import (
     AR,
     COMPILED,
-    FORMS,
     KERNEL,
     RATE_HZ,
+    RIVAL_FORMS,
     CompiledStream,
     LfilterStream,
     SosfiltStream,
@@ -129,7 +129,7 @@ class RenderingBench:
 
     def _filters(self, called: str) -> pd.DataFrame:
         wide = self._wide(called, COMPILED)
-        for name in FORMS:
+        for name in RIVAL_FORMS:
             wide[f"{KERNEL} / {name}"] = wide[KERNEL] / wide[name]
         wide[f"{AR} / kernel"] = wide[AR] / wide[KERNEL]
         return wide
@@ -211,7 +211,7 @@ class RenderingBench:
                 (ONE_CALL, self.throughput, 1.6),
                 (LIVE, self.live, 2.0),
             )
-            for name in FORMS
+            for name in RIVAL_FORMS
             for at, row in _places(table, "update_samples")
         ]
         for at, row in _places(self.blocks, "block_samples"):

@@ -32,11 +32,11 @@ from benches.rendering.bench import (
     UPDATES,
     RenderingBench,
 )
-from benches.rendering.rivals import AR, DIRECT, KERNEL, TPT, TRANSPOSED
+from benches.rendering.rivals import AR, DIRECT_FORM_I, KERNEL, TPT, TRANSPOSED
 
 FILTER_COLOURS = {
     KERNEL: BLUE,
-    DIRECT: ORANGE,
+    DIRECT_FORM_I: ORANGE,
     TRANSPOSED: GREY,
     TPT: GREEN,
     AR: PURPLE,

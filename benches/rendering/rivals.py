@@ -25,12 +25,12 @@ from stimuli.planted.textures import FORCES_N, SPEEDS_MM_S
 
 RATE_HZ = 5000.0
 ORDER = 20
-KERNEL, DIRECT, TRANSPOSED = "kernel", "direct form I", "direct form II"
+KERNEL, DIRECT_FORM_I, TRANSPOSED = "kernel", "direct form I", "direct form II"
 TPT, AR = "TPT", f"AR({ORDER})"
-FORMS = (DIRECT, TRANSPOSED)
-COMPILED = (KERNEL, DIRECT, TRANSPOSED, TPT, AR)
+RIVAL_FORMS = (DIRECT_FORM_I, TRANSPOSED)
+COMPILED = (KERNEL, DIRECT_FORM_I, TRANSPOSED, TPT, AR)
 COEFFICIENTS, BANDS = "coefficients", "bands by their coefficients"
-_KINDS = {DIRECT: 0, TRANSPOSED: 1, TPT: 2, AR: 3, COEFFICIENTS: 3, BANDS: 4}
+_KINDS = {DIRECT_FORM_I: 0, TRANSPOSED: 1, TPT: 2, AR: 3, COEFFICIENTS: 3, BANDS: 4}
 _SPECTRUM_SAMPLES = 5000
 
 
@@ -111,8 +111,8 @@ def operations(name: str, layers: int) -> ProductsAndSums:
     """Of one of `COMPILED` with so many layers and the noise branch (`kernel.h`, `rivals.h`)."""
     if name == AR:
         return ProductsAndSums(ORDER + 1, ORDER)
-    products, sums = {KERNEL: (7, 9), DIRECT: (3, 3), TRANSPOSED: (3, 4), TPT: (5, 6)}[name]
-    of_branch = {KERNEL: (1, 1), DIRECT: (1, 1)}.get(name, (1, 0))  # a gain's ramp; x - x''
+    products, sums = {KERNEL: (7, 9), DIRECT_FORM_I: (3, 3), TRANSPOSED: (3, 4), TPT: (5, 6)}[name]
+    of_branch = {KERNEL: (1, 1), DIRECT_FORM_I: (1, 1)}.get(name, (1, 0))  # a gain's ramp; x - x''
     return ProductsAndSums(products * layers + of_branch[0], sums * layers + of_branch[1])
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from analysis.columns import SIMULATED
+from analysis.columns import SIMULATED_COLUMN
 from analysis.textures.between import RIVAL_ORDER, Truth
 from benches.chart.rival_costs import coefficients_cost
 from benches.rendering.coefficients import CoefficientTable, tabled_predictor
@@ -36,8 +36,8 @@ PLANTED_EXAMPLES = (
 DRAWN_EXAMPLE = "drawn_surfaces"
 DRAWN_SEEDS = (1000, 1001)
 WINDOWS = 20
-FULL, LEAST, RIVAL = "full model", "least model", f"AR({RIVAL_ORDER})"
-COMPARISON_COLUMNS = (
+FULL_MODEL, LEAST, RIVAL = "full model", "least model", f"AR({RIVAL_ORDER})"
+SCENE_COMPARISON_COLUMNS = (
     Column("scene", is_name=True),
     Column("method", is_name=True),
     Column("numbers"),
@@ -52,7 +52,7 @@ COMPARISON_COLUMNS = (
     Column("level_db", "level error, RMS", "dB", format=".2f"),
     Column("level_db_worst", "worst", "dB", format=".2f"),
     Column("windows", "1 s windows", is_name=True),
-    SIMULATED,
+    SIMULATED_COLUMN,
 )
 
 
@@ -120,10 +120,10 @@ def comparison_table(
     Returns
     -------
     DataFrame
-        The columns of `COMPARISON_COLUMNS`, three rows per scene.
+        The columns of `SCENE_COMPARISON_COLUMNS`, three rows per scene.
     """
     rows = [row for pair in examples for row in _rows(*pair)]
-    return pd.DataFrame(rows)[names(COMPARISON_COLUMNS)]
+    return pd.DataFrame(rows)[names(SCENE_COMPARISON_COLUMNS)]
 
 
 def _rows(one: CompiledExample, surfaces: Mapping[str, Surface]) -> list[dict[str, object]]:
@@ -132,7 +132,7 @@ def _rows(one: CompiledExample, surfaces: Mapping[str, Surface]) -> list[dict[st
         _judged(texture, compiled.scene, surfaces[texture.texture]) for texture in compiled.textures
     ]
     costs = {
-        FULL: (
+        FULL_MODEL: (
             sum(stored_numbers(texture.full) for texture in compiled.textures),
             compiled.bytes_before,
             compiled.operations_before,
@@ -155,8 +155,8 @@ def _rows(one: CompiledExample, surfaces: Mapping[str, Surface]) -> list[dict[st
                 "numbers": numbers,
                 "bytes": size,
                 "operations": operations,
-                "fewer_numbers": costs[FULL][0] / numbers,
-                "fewer_operations": costs[FULL][2] / operations,
+                "fewer_numbers": costs[FULL_MODEL][0] / numbers,
+                "fewer_operations": costs[FULL_MODEL][2] / operations,
                 **_summary([each[method] for each in judged]),
                 "windows": f"{kept:.0f} of {count:.0f}" if method == LEAST else "n/a",
                 "simulated": simulated,
@@ -209,7 +209,7 @@ def _judged(texture: CompiledTexture, scene: Scene, surface: Surface) -> dict[st
     )
     rival = [surface.rival.filter(v, f).response(yardstick.frequency_hz) for v, f in conditions]
     features = {
-        FULL: yardstick.features(texture.full.parameters(speed, force)),
+        FULL_MODEL: yardstick.features(texture.full.parameters(speed, force)),
         LEAST: yardstick.features(texture.model.parameters(speed, force)),
         RIVAL: yardstick.features_of(np.array(rival)),
     }

@@ -18,10 +18,10 @@ from analysis.textures.scenes import (
     steps_table,
 )
 from benches.scenes.examples import (
-    COMPARISON_COLUMNS,
-    FULL,
+    FULL_MODEL,
     LEAST,
     RIVAL,
+    SCENE_COMPARISON_COLUMNS,
     CompiledExample,
     Surface,
     comparison_table,
@@ -95,7 +95,7 @@ def _comparison(comparison: pd.DataFrame, simulated: bool) -> Table:
         "update interval of the least model, and reads its coefficients from a table with a node "
         "more between each two of them.",
         comparison,
-        COMPARISON_COLUMNS[:-1],
+        SCENE_COMPARISON_COLUMNS[:-1],
         simulated,
     )
 
@@ -138,7 +138,7 @@ def _tables_by_scene(
 def _outcomes(comparison: pd.DataFrame) -> list[Outcome]:
     sentences = []
     for scene, rows in comparison.groupby("scene", sort=False):
-        full, least, rival = (rows[rows["method"] == m].iloc[0] for m in (FULL, LEAST, RIVAL))
+        full, least, rival = (rows[rows["method"] == m].iloc[0] for m in (FULL_MODEL, LEAST, RIVAL))
         sentences.append(
             f"Scene {scene}: the least models need {least['numbers'] / full['numbers']:.0%} of the "
             f"numbers of the full ones ({least['numbers']} instead of {full['numbers']}), "

@@ -33,14 +33,12 @@ from analysis.statistics.participants.posterior import (
 from analysis.statistics.participants.verdict import PeopleSummary, summary_of
 from benches.validation.people.held_out import HELD_OUT
 from benches.validation.people.situations import (
-    CHOICE,
-    RATINGS,
+    CHOICE_KIND,
+    ODDITY_KIND,
+    RATING_KIND,
     SITUATIONS,
     DrawnStudies,
     Situation,
-)
-from benches.validation.people.situations import (
-    ODDITY as ODD_ONE_OUT,
 )
 from modeling.arrays import Bools, Floats
 from modeling.checks import check_whole
@@ -169,7 +167,7 @@ def posterior_of(
 ) -> list[Draws]:
     """The posterior of each study of a batch."""
     trends = _trends(drawn)
-    if situation.kind == RATINGS:
+    if situation.kind == RATING_KIND:
         ratings = RatingStudies(values=drawn.values, anchors=drawn.checks, trends=trends)
         return rating_draws(ratings, situation.bounds, rng=rng, effort=EFFORT)
     choices = ChoiceStudies(
@@ -179,7 +177,7 @@ def posterior_of(
         catch_asked=np.isfinite(drawn.checks).sum(axis=-1).astype(float),
         trends=trends.mean(axis=-1),
     )
-    model = ODDITY if situation.kind == ODD_ONE_OUT else forced_choice(drawn.values.shape[2])
+    model = ODDITY if situation.kind == ODDITY_KIND else forced_choice(drawn.values.shape[2])
     return choice_draws(choices, model, situation.bounds, rng=rng, effort=EFFORT)
 
 
@@ -199,11 +197,11 @@ def _differences(drawn: DrawnStudies) -> Floats:
 
 def _sensitive(situation: Situation, drawn: DrawnStudies) -> Bools:
     """(k,) whether different surfaces were told apart, as `verdicts` demands it."""
-    if situation.kind == CHOICE:
+    if situation.kind == CHOICE_KIND:
         above = np.nanmean(drawn.values[:, :, :, 0], axis=(2, 3)) - 1 / drawn.values.shape[2]
     elif not drawn.checks.shape[-1]:
         return np.zeros(len(drawn.values), dtype=bool)
-    elif situation.kind == RATINGS:
+    elif situation.kind == RATING_KIND:
         above = np.nanmean(drawn.values, axis=(2, 3, 4)) - np.nanmean(drawn.checks, axis=-1)
     else:
         above = np.nanmean(drawn.checks, axis=-1) - ODDITY.chance

@@ -148,7 +148,7 @@ def _draws(
 
 
 Kind = Callable[[int, np.random.Generator], tuple[Quantities, list[Quantities]]]
-KINDS: Mapping[str, Kind] = {
+RANK_KINDS: Mapping[str, Kind] = {
     "ratings": _ratings,
     "forced choice": lambda studies, rng: _choices(forced_choice(TEXTURES), studies, rng),
     "odd one out": lambda studies, rng: _choices(ODDITY, studies, rng),
@@ -161,7 +161,7 @@ def simulate_ranks(kind: str, *, simulations: int, seed: int) -> list[dict[str, 
     Parameters
     ----------
     kind : str
-        One of `KINDS`.
+        One of `RANK_KINDS`.
     simulations : int
         1 … 1 000 000.
     seed : int
@@ -171,7 +171,7 @@ def simulate_ranks(kind: str, *, simulations: int, seed: int) -> list[dict[str, 
     ranks: dict[str, list[Floats]] = {}
     for start in range(0, simulations, AT_ONCE):
         rng = generator(seed, number_of(f"ranks of {kind}"), start)
-        truth, draws = KINDS[kind](min(AT_ONCE, simulations - start), rng)
+        truth, draws = RANK_KINDS[kind](min(AT_ONCE, simulations - start), rng)
         for name, value in truth.items():
             below = np.sum([one[name] < value for one in draws], axis=0)
             places = 1 + np.sum([one[name] == value for one in draws], axis=0)

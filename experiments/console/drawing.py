@@ -16,9 +16,9 @@ Box = tuple[float, float, float, float]  # x and y of the middle, width, height
 
 # Okabe and Ito's colours, told apart by colour-blind people too.
 BLUE = "#0072B2"
-ORANGE = "#D55E00"
+CONSOLE_ORANGE = "#D55E00"
 INK = "#1F2328"
-GREY = "#5B6470"
+CONSOLE_GREY = "#5B6470"
 PALE = "#C9CFD6"
 CARD = "#FFFFFF"
 PAPER = "#F4F5F7"

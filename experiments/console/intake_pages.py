@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from experiments.console.drawing import CARD, GREY, ORANGE, PALE, text
+from experiments.console.drawing import CARD, CONSOLE_GREY, CONSOLE_ORANGE, PALE, text
 from experiments.console.page_runner import PageRunner
 from experiments.console.widgets import Button
 from experiments.sessions.surfaces import Intake, SessionAborted
@@ -156,7 +156,7 @@ class _Typed:
         self._least, self._most = least, most
         asked = runner.texts.of("question.range", least=f"{least:g}", most=f"{most:g}")
         self._asked = {
-            wrong: runner.remark(asked, y=0.245, color=ORANGE if wrong else GREY)
+            wrong: runner.remark(asked, y=0.245, color=CONSOLE_ORANGE if wrong else CONSOLE_GREY)
             for wrong in (False, True)
         }
         at = (0.0, 0.17)
@@ -247,7 +247,7 @@ def _digit_pad(runner: PageRunner, typed: _Typed) -> dict[str, Button]:
         at=(0.1, 0.075 - 0.3),
         size=(0.088, 0.088),
         action=typed.delete,
-        color=GREY,
+        color=CONSOLE_GREY,
     )
     for button in pad.values():
         button.lit = False

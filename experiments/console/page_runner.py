@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from experiments.console.drawing import ORANGE
+from experiments.console.drawing import CONSOLE_ORANGE
 from experiments.console.events import KeyPress, Keys, Mouse
 from experiments.console.languages import Texts
 from experiments.console.page import Page
@@ -224,7 +224,11 @@ class PageRunner(PageParts):
         ]
         go_on = wide("go on", of("stopping.go_on"), at=(-0.24, -0.385), action=self.finish)
         stop = wide(
-            "stop now", of("stopping.stop"), at=(0.24, -0.385), action=stop_now, color=ORANGE
+            "stop now",
+            of("stopping.stop"),
+            at=(0.24, -0.385),
+            action=stop_now,
+            color=CONSOLE_ORANGE,
         )
 
         def update() -> None:

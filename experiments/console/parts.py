@@ -7,8 +7,8 @@ from typing import Any
 
 from experiments.console.drawing import (
     BLUE,
-    GREY,
-    ORANGE,
+    CONSOLE_GREY,
+    CONSOLE_ORANGE,
     PALE,
     SMALL_HEIGHT,
     TEXT_HEIGHT,
@@ -56,10 +56,15 @@ class PageParts:
     def body(self, content: str, *, y: float = 0.02) -> Any:
         """Some sentences."""
         return fitted(
-            self.window, content, box=(1.0, 0.26), height=TEXT_HEIGHT, at=(0.0, y), color=GREY
+            self.window,
+            content,
+            box=(1.0, 0.26),
+            height=TEXT_HEIGHT,
+            at=(0.0, y),
+            color=CONSOLE_GREY,
         )
 
-    def remark(self, content: str, *, y: float, color: str = GREY) -> Any:
+    def remark(self, content: str, *, y: float, color: str = CONSOLE_GREY) -> Any:
         """A line in small type."""
         return fitted(
             self.window, content, box=(1.2, 0.08), height=SMALL_HEIGHT, at=(0.0, y), color=color
@@ -95,7 +100,7 @@ class PageParts:
             content,
             at=(HALF_WIDTH, FOOT_Y),
             height=FOOT_HEIGHT,
-            color=GREY,
+            color=CONSOLE_GREY,
             anchor="right",
         )
 
@@ -121,7 +126,7 @@ class PageParts:
             f"{done} / {of}",
             at=(-HALF_WIDTH, FOOT_Y),
             height=FOOT_HEIGHT,
-            color=GREY,
+            color=CONSOLE_GREY,
             anchor="left",
         )
         return [bar(BAR[0], PALE), *filled, told]
@@ -137,7 +142,7 @@ class PageParts:
             words,
             at=(-HALF_WIDTH, TOP_Y),
             height=SMALL_HEIGHT,
-            color=ORANGE,
+            color=CONSOLE_ORANGE,
             bold=True,
             anchor="left",
         )
@@ -150,7 +155,7 @@ class PageParts:
             at=(HALF_WIDTH - 0.055, TOP_Y),
             size=(0.11, 0.044),
             action=action,
-            color=GREY,
+            color=CONSOLE_GREY,
             height=FOOT_HEIGHT,
         )
         button.lit = False

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from experiments.console.drawing import INK, ORANGE, SMALL_HEIGHT, Point
+from experiments.console.drawing import CONSOLE_ORANGE, INK, SMALL_HEIGHT, Point
 from experiments.console.page_runner import PageRunner
 from experiments.console.widgets import Button, RatingScale
 from experiments.sessions.surfaces import Choice, RatedTrial, Rating, Surfaces
@@ -124,7 +124,7 @@ def _real(runner: PageRunner, surfaces: Surfaces, *, at: tuple[float, float]) ->
         at=at,
         size=(0.36, 0.078),
         action=surfaces.present_real,
-        color=ORANGE,
+        color=CONSOLE_ORANGE,
     )
 
 

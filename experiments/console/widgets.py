@@ -13,7 +13,7 @@ from typing import Any, Protocol
 from experiments.console.drawing import (
     BLUE,
     CARD,
-    GREY,
+    CONSOLE_GREY,
     INK,
     PALE,
     SMALL_HEIGHT,
@@ -172,7 +172,7 @@ class Button:
         self._shape.fillColor = self._color if lit else CARD
         self._shape.lineColor = self._color if self.enabled else PALE
         self._shape.lineWidth = 5 if self._held else 2
-        self._label.color = CARD if lit else (self._color if self.enabled else GREY)
+        self._label.color = CARD if lit else (self._color if self.enabled else CONSOLE_GREY)
 
     def handles(self) -> dict[str, Point]:
         """The button's middle."""
@@ -228,15 +228,27 @@ class RatingScale:
             granularity=0,
             readOnly=True,
             markerColor=BLUE,
-            lineColor=GREY,
+            lineColor=CONSOLE_GREY,
             autoLog=False,
         )
         left, right, below = at[0] - width / 2, at[0] + width / 2, at[1] - 0.05
         self._texts = [
             text(window, label, at=(at[0], at[1] + 0.065), bold=True),
-            text(window, ends[0], at=(left, below), height=SMALL_HEIGHT, color=GREY, anchor="left"),
             text(
-                window, ends[1], at=(right, below), height=SMALL_HEIGHT, color=GREY, anchor="right"
+                window,
+                ends[0],
+                at=(left, below),
+                height=SMALL_HEIGHT,
+                color=CONSOLE_GREY,
+                anchor="left",
+            ),
+            text(
+                window,
+                ends[1],
+                at=(right, below),
+                height=SMALL_HEIGHT,
+                color=CONSOLE_GREY,
+                anchor="right",
             ),
         ]
 

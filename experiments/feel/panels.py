@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from experiments.console.drawing import BLUE, GREY, INK, ORANGE, text
+from experiments.console.drawing import BLUE, CONSOLE_GREY, CONSOLE_ORANGE, INK, text
 from experiments.feel.plots import (
     PIXELS,
     TICK_HEIGHT,
@@ -132,16 +132,18 @@ class SpectrumPlot:
             card(window, box=box),
             text(window, heading, at=at, height=HEADING_HEIGHT, bold=True, anchor="left"),
             *self._axes.decoration(window),
-            line(window, [(left + 0.09, top - 0.06), (left + 0.13, top - 0.06)], color=GREY),
+            line(
+                window, [(left + 0.09, top - 0.06), (left + 0.13, top - 0.06)], color=CONSOLE_GREY
+            ),
             line(window, [(left + 0.34, top - 0.06), (left + 0.38, top - 0.06)], color=BLUE),
         ]
         self._legend = [
             LiveText(window, at=(left + at_x, top - 0.06), color=color)
-            for at_x, color in ((0.14, GREY), (0.39, BLUE))
+            for at_x, color in ((0.14, CONSOLE_GREY), (0.39, BLUE))
         ]
         self._scale = window.size[1] / PIXELS
         start = self._axes.points([10.0, highest_hz], density[0])
-        self._curves = [line(window, start, color=color) for color in (GREY, BLUE)]
+        self._curves = [line(window, start, color=color) for color in (CONSOLE_GREY, BLUE)]
 
     def fixed(self) -> list[Any]:
         """What changes with the texture alone."""
@@ -199,9 +201,9 @@ class LayerPanel:
         foot = self._axes.points([10.0, 10.0], self._floor)
         self._stems = [
             [line(window, foot, color=color, width=width) for _ in range(most_layers)]
-            for color, width in ((GREY, 2), (BLUE, 4))
+            for color, width in ((CONSOLE_GREY, 2), (BLUE, 4))
         ]
-        self._markers = [Marker(window, color=color) for color in (GREY, BLUE)]
+        self._markers = [Marker(window, color=color) for color in (CONSOLE_GREY, BLUE)]
         self._labels = [
             LiveText(window, at=(0.0, 0.0), anchor="center", bold=True) for _ in range(most_layers)
         ]
@@ -239,7 +241,9 @@ class LayerPanel:
             parts.append(Drawn(Marker(window, color=INK, radius=0.008), (x, y), filled, diamond))
             parts.append(text(window, words, at=(x + 0.015, y), height=TICK_HEIGHT, anchor="left"))
         below = (0.5 * (left + right) + 0.03, bottom + 0.017)
-        parts.append(text(window, "frequency (Hz)", at=below, height=TICK_HEIGHT, color=GREY))
+        parts.append(
+            text(window, "frequency (Hz)", at=below, height=TICK_HEIGHT, color=CONSOLE_GREY)
+        )
         return parts
 
     def show_words(self, plays: ModelNow) -> None:
@@ -308,7 +312,7 @@ class HandPanel:
             for opacity in np.linspace(0.15, 0.9, TRAIL_PARTS)
         ]
         self._dots = {
-            inside: Marker(window, color=GREEN if inside else ORANGE, radius=0.013)
+            inside: Marker(window, color=GREEN if inside else CONSOLE_ORANGE, radius=0.013)
             for inside in (True, False)
         }
         self._been = np.empty((0, 2))

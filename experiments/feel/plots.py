@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from experiments.console.drawing import CARD, GREY, INK, PALE, Point, rounded, text
+from experiments.console.drawing import CARD, CONSOLE_GREY, INK, PALE, Point, rounded, text
 from modeling.arrays import Floats
 
 TICK_HEIGHT = 0.019
@@ -62,7 +62,7 @@ class Axes:
             parts.append(line(window, [(x, bottom), (x, top)], color=PALE, width=1))
             if label_x:
                 at = (float(x), bottom - TICK_GAP - TICK_HEIGHT / 2)
-                parts.append(text(window, label, at=at, height=TICK_HEIGHT, color=GREY))
+                parts.append(text(window, label, at=at, height=TICK_HEIGHT, color=CONSOLE_GREY))
         for (_, y), label in zip(
             self.points([self.x.ends[0]] * len(self.y.ticks), self.y.ticks),
             self.y.labels,
@@ -70,9 +70,11 @@ class Axes:
         ):
             parts.append(line(window, [(left, y), (right, y)], color=PALE, width=1))
             at = (left - TICK_GAP, float(y))
-            parts.append(text(window, label, at=at, height=TICK_HEIGHT, color=GREY, anchor="right"))
+            parts.append(
+                text(window, label, at=at, height=TICK_HEIGHT, color=CONSOLE_GREY, anchor="right")
+            )
         corners = [(left, top), (left, bottom), (right, bottom)]
-        return [*parts, line(window, corners, color=GREY, width=1.5)]
+        return [*parts, line(window, corners, color=CONSOLE_GREY, width=1.5)]
 
 
 def decades(low: float, high: float) -> list[float]:

@@ -193,7 +193,7 @@ def amplitude_range(yardstick: FeltCriterion, textures: Sequence[Texture]) -> tu
 
 # --- Words -----------------------------------------------------------------------------------
 
-PLACES: dict[Place, str] = {
+PLACE_WORDS: dict[Place, str] = {
     "off": "lifted off: silence",
     "rest": "at rest: silence",
     "below": "outside the grid: fades out",

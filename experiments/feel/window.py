@@ -10,7 +10,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from experiments.console.drawing import BLUE, GREY, ORANGE, text
+from experiments.console.drawing import BLUE, CONSOLE_GREY, CONSOLE_ORANGE, text
 from experiments.console.events import Mouse
 from experiments.console.page import Page
 from experiments.console.screens import open_window
@@ -19,7 +19,7 @@ from experiments.feel.panels import HandPanel, LayerPanel, Layout, SpectrumPlot,
 from experiments.feel.plots import TICK_HEIGHT, CachedPicture, LiveText, card
 from experiments.feel.view import (
     HIGHEST_SHARE,
-    PLACES,
+    PLACE_WORDS,
     FeltCriterion,
     ModelNow,
     Now,
@@ -188,7 +188,11 @@ class FeelWindow:
         left = -layout.half + 0.02
         self._title = LiveText(self.window, at=(left, 0.455), height=0.042, bold=True)
         self._notes = LiveText(
-            self.window, at=(left, 0.411), color=ORANGE, bold=True, wrap=2 * layout.half - 0.04
+            self.window,
+            at=(left, 0.411),
+            color=CONSOLE_ORANGE,
+            bold=True,
+            wrap=2 * layout.half - 0.04,
         )
         right = layout.half - 0.02
         lead = text(
@@ -196,14 +200,14 @@ class FeelWindow:
             LEAD,
             at=(right, 0.44),
             height=TICK_HEIGHT,
-            color=GREY,
+            color=CONSOLE_GREY,
             wrap=0.42,
             anchor="right",
         )
         wrap = 2 * layout.half - 0.04
         self._foot = {
             color: LiveText(self.window, at=(0.0, -0.468), color=color, anchor="center", wrap=wrap)
-            for color in (GREY, ORANGE)
+            for color in (CONSOLE_GREY, CONSOLE_ORANGE)
         }
         x, top = layout.status[0] + 0.02, layout.status[3]
         self._status = [
@@ -248,9 +252,9 @@ class FeelWindow:
         width = (right - left - 0.07) / 4
         visit = self._visit
         wanted = [
-            ("full", "Full", GREY, lambda: visit.switch_model(simplified=False)),
+            ("full", "Full", CONSOLE_GREY, lambda: visit.switch_model(simplified=False)),
             ("simplified", "Simplified", BLUE, lambda: visit.switch_model(simplified=True)),
-            ("stop", "Stop", ORANGE, visit.stop_or_play),
+            ("stop", "Stop", CONSOLE_ORANGE, visit.stop_or_play),
             ("noise", "Noise", BLUE, visit.switch_masking),
         ]
         self._modes = {
@@ -288,7 +292,7 @@ class FeelWindow:
         if time.perf_counter() >= self._words_due_s:
             self._words_due_s = time.perf_counter() + WORDS_S
             self._show_words(now, shown)
-            self._hand.show_words(hand_words(hand), PLACES[now.place])
+            self._hand.show_words(hand_words(hand), PLACE_WORDS[now.place])
         self._ground.draw()
         self._spectrum.draw(now, plays=shown if visit.playing else None)
         self._layers.draw(now, plays=shown)
@@ -306,8 +310,8 @@ class FeelWindow:
         simulated = ("simulated texture",) if visit.texture.full.simulated else ()
         changes = (
             self._notes.show(", ".join([*simulated, *visit.rig.notes])),
-            self._foot[GREY].show("" if self._fault else KEYS),
-            self._foot[ORANGE].show(short(self._fault, LONGEST_FAULT)),
+            self._foot[CONSOLE_GREY].show("" if self._fault else KEYS),
+            self._foot[CONSOLE_ORANGE].show(short(self._fault, LONGEST_FAULT)),
         )
         if any(changes):
             self._ground.renew()

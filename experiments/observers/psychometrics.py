@@ -19,8 +19,8 @@ from modeling.checks import check_keys, check_number
 from modeling.errors import shown
 from modeling.participants.ratings import RatingPriors, careless_sds
 
-SCALES = ("magnitude_similarity", "frequency_similarity")
-EFFECTS = (*SCALES, "choice")
+RATED_SCALES = ("magnitude_similarity", "frequency_similarity")
+EFFECTS = (*RATED_SCALES, "choice")
 FURTHEST_SD = 3.0  # nobody is further from the mean of a trait
 LOWEST_FELT, HIGHEST_FELT = 3.0, 95.0  # ratings that distances can stand for, in points
 MOST_POINTS = 90.0  # between anybody's judgements of two models

@@ -15,7 +15,7 @@ import numpy as np
 from experiments.observers.percepts import Perception
 from experiments.observers.psychometrics import (
     EFFECTS,
-    SCALES,
+    RATED_SCALES,
     Psychometrics,
     choice_shares,
     with_effect,
@@ -118,7 +118,7 @@ class SimulatedParticipant:
         for _ in range(1 + self._looks()):
             surfaces.toggle()
         if self._rng.random() < self.person.lapse_rate:
-            given = lapsed_ratings(self._rng, (len(SCALES),))
+            given = lapsed_ratings(self._rng, (len(RATED_SCALES),))
         else:
             given = censored(self._rng.normal(self.judgements(trial), self._noise_sd(trial)))
         magnitude, frequency = (round(value, 2) for value in given.tolist())
@@ -137,7 +137,7 @@ class SimulatedParticipant:
         """
         if self.person.careless:
             return self.person.level, self.person.level
-        magnitude, frequency = (self._felt(trial, scale) for scale in range(len(SCALES)))
+        magnitude, frequency = (self._felt(trial, scale) for scale in range(len(RATED_SCALES)))
         return magnitude + self.person.magnitude_bias, frequency + self.person.frequency_bias
 
     def _felt(self, trial: RatedTrial, scale: int) -> float:
@@ -146,7 +146,7 @@ class SimulatedParticipant:
             self._perception.place[texture] for texture in (trial.texture, trial.virtual_texture)
         )
         model = self._perception.set_number[trial.model]
-        effect = self.own_effect(trial.texture, SCALES[scale]) if real == virtual else None
+        effect = self.own_effect(trial.texture, RATED_SCALES[scale]) if real == virtual else None
         apart = self._from_real[scale][model if effect is None else 0][real][virtual]
         felt = self._psychometrics.felt_rating(apart)
         return felt + effect if effect is not None and model else felt
@@ -254,7 +254,7 @@ class SimulatedParticipant:
         first, second = sorted({self._perception.set_number[name] for name in trial.layout})
         place = self._perception.place[trial.texture]
         apart = []
-        for scale, name in enumerate(SCALES):
+        for scale, name in enumerate(RATED_SCALES):
             points = None if first else self._psychometrics.effect(trial.texture, name)
             if points is None:
                 apart.append(self._between[scale][first][second][place])

@@ -112,7 +112,7 @@ _OWN = (
 _FROM_PRESENTATIONS = without(
     PRESENTATION_COLUMNS, "run", "trial", "surface", "start_s", "end_s", "faults"
 )
-COLUMNS = (*_OWN, *_FROM_PRESENTATIONS)
+EVENT_COLUMNS = (*_OWN, *_FROM_PRESENTATIONS)
 # Answers are in their own tables, the participants' in participants.tsv.
 _ELSEWHERE = ("answers", "row", "manifest_sha256", "overrides", "changed", "cut")
 

@@ -27,7 +27,7 @@ LONGEST_GAP_S = 0.02
 _LONGEST_PAUSE_S = 3600.0
 _MOST_ROWS_PER_READING = 50
 
-COLUMNS = (
+PHYSIO_COLUMNS = (
     Column(
         "speed_mm_s",
         unit="mm/s",
@@ -103,8 +103,8 @@ def at_regular_times(hand: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row every 4 ms, with `COLUMNS`; NaN between trials, and between readings that are more
-        than 20 ms apart.
+        One row every 4 ms, with `PHYSIO_COLUMNS`; NaN between trials, and between readings that are
+        more than 20 ms apart.
     """
     hand = hand.sort_values("time_s", kind="stable")
     time_s = hand["time_s"].to_numpy(float)

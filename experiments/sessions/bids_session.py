@@ -69,7 +69,7 @@ def _columns(held: StoredSession) -> list[AnswerColumn]:
 def _events(held: StoredSession, presentations: list[dict[str, str]]) -> Made:
     rows = bids_events.event_rows(held.state.events, presentations)
     table = held.files.beh / f"{held.files.stem}_events.tsv"
-    described = sidecar_of(bids_events.COLUMNS)
+    described = sidecar_of(bids_events.EVENT_COLUMNS)
     described["trial_type"]["Levels"] = bids_events.trial_types(rows)
     manifest = held.manifest
     sidecar = {
@@ -83,7 +83,7 @@ def _events(held: StoredSession, presentations: list[dict[str, str]]) -> Made:
         **described,
     }
     return {
-        table: table_bytes(bids_events.COLUMNS, rows),
+        table: table_bytes(bids_events.EVENT_COLUMNS, rows),
         table.with_suffix(".json"): json_bytes(sidecar),
     }
 
@@ -108,11 +108,11 @@ def _hand(held: StoredSession, runs: set[int]) -> tuple[Made, tuple[str, ...]]:
             {
                 "SamplingFrequency": bids_physio.RATE_HZ,
                 "StartTime": start_s,
-                "Columns": names(bids_physio.COLUMNS),
+                "Columns": names(bids_physio.PHYSIO_COLUMNS),
                 "TaskName": held.manifest.task,
                 "PhysioType": "generic",
                 **_simulated(held.manifest),
-                **sidecar_of(bids_physio.COLUMNS),
+                **sidecar_of(bids_physio.PHYSIO_COLUMNS),
             }
         )
         regular = bids_physio.at_regular_times(readings)

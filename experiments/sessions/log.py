@@ -22,7 +22,7 @@ from modeling.files.reading import read_bytes
 
 Event = dict[str, Any]
 OWN_FIELDS = ("n", "utc", "t_s", "run", "event")
-ENDINGS = ("complete", "aborted", "crashed")
+SESSION_ENDS = ("complete", "aborted", "crashed")
 _LONGEST_S = 1e9  # of a run: 30 years
 _YEARS = range(2000, 2200)  # in which every time zone has a date for a moment
 
@@ -113,7 +113,7 @@ _FIELDS_OF: dict[str, dict[str, Callable[[object], bool]]] = {
     "opened": {"manifest_sha256": _is(str), "overrides": _or_none(_are_objects)},
     "welcome": {"consent": _or_none(_is(str)), "answers": _or_none(_is(dict))},
     "answer": {"row": _is(dict)},
-    "ended": {"status": lambda value: value in ENDINGS},
+    "ended": {"status": lambda value: value in SESSION_ENDS},
 }
 
 

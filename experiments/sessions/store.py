@@ -22,7 +22,7 @@ from experiments.sessions.files import (
     open_file,
     write_new,
 )
-from experiments.sessions.log import ENDINGS, OWN_FIELDS, read_log, utc_text
+from experiments.sessions.log import OWN_FIELDS, SESSION_ENDS, read_log, utc_text
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.overrides import Overrides
 from experiments.sessions.state import SessionState, state_of
@@ -362,8 +362,10 @@ class SessionStore:
 
     def finish(self, status: str, reason: str = "", *, by: str = "") -> None:
         """See `Store.finish`."""
-        if status not in ENDINGS:
-            raise InputError(f"expected {', '.join(ENDINGS)}, got {shown(status)}; choose one.")
+        if status not in SESSION_ENDS:
+            raise InputError(
+                f"expected {', '.join(SESSION_ENDS)}, got {shown(status)}; choose one."
+            )
         fields = {"status": status, "reason": reason, "by": by}
         self._writer.put_safely(self._event("ended", fields))
 

@@ -19,14 +19,14 @@ from modeling.errors import counted
 from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.columns import Column, chosen
 from modeling.files.tables import Row, read_table, table_text
-from modeling.perception.thresholds import COLUMNS as THRESHOLD_COLUMNS
+from modeling.perception.thresholds import THRESHOLD_COLUMNS
 
 READ = chosen(
     ANSWER_TABLES["threshold"].columns,
     *("phase", "frequency_hz", "amplitude_g", "highest_g", "correct", "valid"),
     *("pilot", "simulated"),
 )
-COLUMNS = (
+THRESHOLD_TABLE_COLUMNS = (
     *chosen(THRESHOLD_COLUMNS, "frequency_hz", "acceleration_g"),
     Column("low_g", unit="g", description="Lower end of its 95 % interval; n/a of a bound"),
     Column("high_g", unit="g", description="Upper end of its 95 % interval; n/a of a bound"),
@@ -220,7 +220,7 @@ def threshold_text(means: Sequence[MeanThreshold], *, people: int, simulated: bo
         f"# source: tactileq threshold, {who}: two-interval forced choice (QUEST+) of bursts of "
         f"{DURATION_S:g} s, 75 % correct, lapses excluded\n# caveat: {caveat}\n"
     )
-    return notes + table_text(COLUMNS, [_cells(one) for one in means])
+    return notes + table_text(THRESHOLD_TABLE_COLUMNS, [_cells(one) for one in means])
 
 
 def _cells(one: MeanThreshold) -> dict[str, object]:

@@ -18,7 +18,7 @@ from modeling.estimation.compiled import CompiledLines, is_compiled
 from modeling.recordings.spectrum import HIGH_PASS_HZ, Spectrum
 
 # Half an octave above its corner the preparation's high-pass takes less than 0.2 dB.
-LOWEST_HZ = 1.5 * HIGH_PASS_HZ
+LOWEST_FITTED_HZ = 1.5 * HIGH_PASS_HZ
 HIGHEST_SHARE = 0.98
 EMPTY_BELOW_DB = -50.0  # smoothed spectrum relative to its maximum: no signal there
 # Real spectra are no exact sums of bands: a bin's relative misfit that is forgiven.
@@ -147,7 +147,7 @@ def is_silent(spectrum: Spectrum) -> bool:
 def _fitted_band(spectrum: Spectrum) -> Bools:
     """Lines (n,) from 15 Hz to 0.98 of the Nyquist frequency."""
     frequency = spectrum.frequency_hz
-    return (frequency >= LOWEST_HZ) & (frequency <= HIGHEST_SHARE * spectrum.rate_hz / 2)
+    return (frequency >= LOWEST_FITTED_HZ) & (frequency <= HIGHEST_SHARE * spectrum.rate_hz / 2)
 
 
 def split(theta: Floats, m: int) -> tuple[Floats, Floats, Floats, Floats]:
@@ -319,6 +319,6 @@ def limits_of_sum(m: int, power: Power) -> tuple[Floats, Floats]:
         places = np.repeat(np.log([frequency_hz, bandwidth_hz]), m)
         return np.concatenate(([gain], places, np.full(m, gain), [np.log(shape)]))
 
-    low = limit(-WIDEST_LOG_GAIN, LOWEST_HZ, narrowest_hz, SHAPE_RANGE[0])
+    low = limit(-WIDEST_LOG_GAIN, LOWEST_FITTED_HZ, narrowest_hz, SHAPE_RANGE[0])
     highest_hz = HIGHEST_FREQUENCY_SHARE * power.rate_hz
     return low, limit(WIDEST_LOG_GAIN, highest_hz, WIDEST_SHARE * power.rate_hz, SHAPE_RANGE[1])

@@ -7,7 +7,7 @@ from math import inf
 from modeling.files.columns import ABOVE_0, Column
 
 MANIFEST = "manifest.tsv"
-COLUMNS = (
+STIMULUS_COLUMNS = (
     Column("file", description="name of the WAV file", required=True),
     Column("texture", description="texture of the model", required=True),
     Column("model", description="label of the model in the recipe", required=True),

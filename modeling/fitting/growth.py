@@ -15,7 +15,7 @@ import numpy as np
 from modeling.arrays import Floats, Integers
 from modeling.equalizer.bands import HIGHEST_FREQUENCY_SHARE
 from modeling.estimation.coherent import Observed, response
-from modeling.estimation.likelihood import FORGIVEN_MISFIT, LOWEST_HZ, Power, split
+from modeling.estimation.likelihood import FORGIVEN_MISFIT, LOWEST_FITTED_HZ, Power, split
 from modeling.fitting.texture_grid import TextureGrid
 
 CELL = 0.02  # of log frequency
@@ -90,8 +90,8 @@ def _distinct(
             continue
         taken.append((place, width))
         inside = np.clip(place, 0, raised.shape[1] - 1)
-        frequency = LOWEST_HZ * np.exp((place + 0.5) * CELL)
-        frequency = np.clip(frequency, LOWEST_HZ, HIGHEST_FREQUENCY_SHARE * rate_hz)
+        frequency = LOWEST_FITTED_HZ * np.exp((place + 0.5) * CELL)
+        frequency = np.clip(frequency, LOWEST_FITTED_HZ, HIGHEST_FREQUENCY_SHARE * rate_hz)
         height = np.where(place == inside, raised[np.arange(len(place)), inside], 1.0)
         # A Lorentzian of width B is detected best by a box of about 1.4 B.
         bandwidth = 0.7 * width * CELL * frequency
@@ -106,7 +106,7 @@ def _excess(
 ) -> tuple[Floats, Floats]:
     """Cumulated power ratio and number of lines, (C, cells + 1), at the borders of cells."""
     highest = max(p.frequency_hz[-1] for p in powers if p is not None)
-    borders = LOWEST_HZ * np.exp(np.arange(0.0, np.log(highest / LOWEST_HZ), CELL))
+    borders = LOWEST_FITTED_HZ * np.exp(np.arange(0.0, np.log(highest / LOWEST_FITTED_HZ), CELL))
     ratio, lines = np.zeros((2, len(powers), borders.size))
     for row, power in enumerate(powers):
         if power is None:

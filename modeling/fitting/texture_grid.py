@@ -10,7 +10,7 @@ import numpy as np
 
 from modeling.arrays import Bools, Floats, Integers
 from modeling.estimation.coherent import Observed, limits_of, observe
-from modeling.estimation.likelihood import LOWEST_HZ, NEPER_DB, Power, signal_power, split
+from modeling.estimation.likelihood import LOWEST_FITTED_HZ, NEPER_DB, Power, signal_power, split
 from modeling.fitting.blending import Middles
 from modeling.fitting.equations import Corners, cells, corners_of
 from modeling.fitting.field import Field
@@ -216,7 +216,7 @@ class TextureGrid:
     def sampled(self) -> Observed:
         """Frequencies at which responses are compared, one row, evenly spaced in logarithms."""
         highest = max(power.frequency_hz[-1] for power in self._powers_there)
-        frequency = np.geomspace(LOWEST_HZ, highest, SAMPLED)
+        frequency = np.geomspace(LOWEST_FITTED_HZ, highest, SAMPLED)
         tangent = np.tan(np.pi / self.rate_hz * frequency)[None]
         one = np.ones(tangent.shape)
         return Observed(one, one, one, tangent, 1 / tangent, np.zeros(1), self.rate_hz)

@@ -27,7 +27,7 @@ SHIPPED = ("codec", "pen-hold", "mobile")
 # Beyond anybody's threshold on both sides; within, levels in decibels and pictures stay finite.
 FREQUENCIES_HZ = (1e-6, 1e6)
 LEVELS_G = (1e-9, 1e6)
-COLUMNS = (
+THRESHOLD_COLUMNS = (
     Column(
         "frequency_hz",
         unit="Hz",
@@ -138,7 +138,7 @@ class Threshold(FileSection):
             For a missing file, missing or doubled columns or values that are no thresholds.
         """
         source = Path(path)
-        rows = read_cells(source, COLUMNS[:1])
+        rows = read_cells(source, THRESHOLD_COLUMNS[:1])
         columns = [name for name in LEVEL_COLUMNS if rows and name in rows[0][1]]
         if len(columns) != 1:
             got = "both" if columns else ("neither" if rows else "no rows")
@@ -146,7 +146,7 @@ class Threshold(FileSection):
                 f"expected one column, {' or '.join(LEVEL_COLUMNS)}, with values in {source}, got "
                 f"{got}; a threshold needs one level (peak) for each frequency."
             )
-        used = chosen(COLUMNS, "frequency_hz", *columns)
+        used = chosen(THRESHOLD_COLUMNS, "frequency_hz", *columns)
         values = [typed(cells, used, where) for where, cells in rows]
         frequency, level = (
             np.array([row[column.name] for row in values], dtype=np.float64) for column in used

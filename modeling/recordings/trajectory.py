@@ -15,7 +15,7 @@ from modeling.files.tables import read_table
 from modeling.hand import Hand
 
 LONGEST_S = 3600.0
-COLUMNS = (
+TRAJECTORY_COLUMNS = (
     Column("time_s", unit="s", description="Rising", limits=(-inf, inf), nan=True, required=True),
     Column(
         "speed_mm_s",
@@ -61,7 +61,7 @@ class Trajectory:
     force_n: Floats
 
     def __post_init__(self) -> None:
-        for name in names(COLUMNS):
+        for name in names(TRAJECTORY_COLUMNS):
             value = np.array(getattr(self, name), dtype=np.float64)
             value.setflags(write=False)
             object.__setattr__(self, name, value)
@@ -127,8 +127,9 @@ def load_trajectory(path: str | Path, *, name: str) -> Trajectory:
     InputError
         For a missing file, missing columns, cells that are no numbers, or times that do not rise.
     """
-    rows = read_table(path, COLUMNS, what="a trajectory (CSV)", delimiter=",")
+    rows = read_table(path, TRAJECTORY_COLUMNS, what="a trajectory (CSV)", delimiter=",")
     time_s, speed_mm_s, force_n = (
-        np.array([row[column] for row in rows], dtype=np.float64) for column in names(COLUMNS)
+        np.array([row[column] for row in rows], dtype=np.float64)
+        for column in names(TRAJECTORY_COLUMNS)
     )
     return Trajectory(name, time_s, speed_mm_s, force_n)

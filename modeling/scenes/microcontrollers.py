@@ -14,7 +14,7 @@ from modeling.errors import InputError, shown
 from modeling.files.columns import ABOVE_0, Column
 from modeling.files.tables import read_table
 
-COLUMNS = (
+CONTROLLER_COLUMNS = (
     Column("name", description="By which scenes name it", required=True),
     Column("core", description="Its processor, with a floating-point unit", required=True),
     Column(
@@ -101,6 +101,9 @@ def _shipped() -> dict[str, MicroController]:
 
 
 def load_microcontrollers(path: Path) -> dict[str, MicroController]:
-    """Micro-controllers by name, from a TSV with `COLUMNS`."""
-    rows: list[dict[str, Any]] = [dict(row) for row in read_table(path, COLUMNS)]
-    return {row["name"]: MicroController(**{c.name: row[c.name] for c in COLUMNS}) for row in rows}
+    """Micro-controllers by name, from a TSV with `CONTROLLER_COLUMNS`."""
+    rows: list[dict[str, Any]] = [dict(row) for row in read_table(path, CONTROLLER_COLUMNS)]
+    return {
+        row["name"]: MicroController(**{c.name: row[c.name] for c in CONTROLLER_COLUMNS})
+        for row in rows
+    }

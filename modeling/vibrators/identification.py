@@ -16,7 +16,7 @@ from modeling.checks import check_rate
 from modeling.equalizer.peq import PEQ
 from modeling.errors import InputError
 from modeling.estimation.given_count import fit_layer_count
-from modeling.estimation.likelihood import EMPTY_BELOW_DB, HIGHEST_SHARE, LOWEST_HZ
+from modeling.estimation.likelihood import EMPTY_BELOW_DB, HIGHEST_SHARE, LOWEST_FITTED_HZ
 from modeling.recordings.recording import clipped_samples
 from modeling.recordings.spectrum import HIGH_PASS_HZ, MODEL_RATE_HZ, Spectrum
 from modeling.vibrators.compensation import FLAT_WITHIN_DB
@@ -167,7 +167,7 @@ def _transfer(drive: Floats, acceleration: Floats, *, rate_hz: float) -> _Transf
 
 def _band(curves: Floats) -> tuple[float, float, float]:
     """Where the response is highest, and the band around it that is fitted."""
-    frequency, response, _ = curves[:, curves[0] >= LOWEST_HZ]
+    frequency, response, _ = curves[:, curves[0] >= LOWEST_FITTED_HZ]
     centre = float(frequency[np.argmax(response)])
     low, high = np.clip(np.multiply(BAND_SHARES, centre), frequency[0], frequency[-1])
     return centre, float(low), float(high)
@@ -200,7 +200,7 @@ def _check_resonance(layer: PEQ, height: float, *, transfer: _Transfer) -> None:
             f"part, got {height_db:.1f} dB at {frequency_hz:.0f} Hz; check that the first record "
             "is the drive and the second the acceleration, else there is nothing to compensate."
         )
-    lowest_hz, highest_hz = LOWEST_HZ * np.sqrt(2), HIGHEST_SHARE * transfer.rate_hz / 4
+    lowest_hz, highest_hz = LOWEST_FITTED_HZ * np.sqrt(2), HIGHEST_SHARE * transfer.rate_hz / 4
     if not lowest_hz <= frequency_hz <= highest_hz:
         raise InputError(
             f"expected a resonance within {lowest_hz:.0f} to {highest_hz:.0f} Hz, got the highest "

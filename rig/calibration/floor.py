@@ -15,7 +15,7 @@ from modeling.errors import InputError
 from modeling.recordings.sinusoids import MAINS_HZ, Sinusoids, mains_harmonics
 from rig.calibration.level import check_unclipped
 
-SHORTEST_S = 2.0
+SHORTEST_FLOOR_S = 2.0
 LOWEST_HZ = 10.0
 # As recordings are modelled: what is further up counts for nobody's skin.
 HIGHEST_HZ = 1000.0
@@ -68,9 +68,9 @@ def no_contact_floor(samples_g: ArrayLike, *, rate_hz: float) -> Floor:
         For a short record, a constant one, or a clipped one.
     """
     samples = np.asarray(samples_g, dtype=np.float64)
-    if samples.size < SHORTEST_S * rate_hz:
+    if samples.size < SHORTEST_FLOOR_S * rate_hz:
         raise InputError(
-            f"expected at least {SHORTEST_S:g} s of the accelerometer at rest, got "
+            f"expected at least {SHORTEST_FLOOR_S:g} s of the accelerometer at rest, got "
             f"{samples.size / rate_hz:.2g} s; record longer."
         )
     check_unclipped(samples)

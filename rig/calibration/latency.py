@@ -20,7 +20,7 @@ AIM_MS = 20.0
 # Textures are felt to change at about 40 ms (Okamoto and others 2009).
 MOST_MS = 40.0
 LEAST_TRIALS = 50
-HIGH_PASS_HZ = 20.0  # what the hand itself does is slower
+LATENCY_HIGH_PASS_HZ = 20.0  # what the hand itself does is slower
 LEAST_STEP_DB = 10.0
 LEAST_EVIDENCE = 20.0  # of the logarithm of the likelihood
 LEAST_VIBRATION_S = 2e-3
@@ -33,7 +33,7 @@ def high_passed(samples: ArrayLike, *, rate_hz: float) -> Floats:
     """Samples without what is below 20 Hz; causal, so that no onset moves forward."""
     from scipy.signal import butter, sosfilt, sosfilt_zi  # late: as below
 
-    sos = butter(2, HIGH_PASS_HZ, "highpass", fs=rate_hz, output="sos")
+    sos = butter(2, LATENCY_HIGH_PASS_HZ, "highpass", fs=rate_hz, output="sos")
     values = np.asarray(samples, dtype=np.float64)
     return np.asarray(sosfilt(sos, values, zi=sosfilt_zi(sos) * values[0])[0])
 

@@ -33,7 +33,7 @@ REST_LOOKED_AT_S = 0.04
 MORE = 1.2  # trials than wanted: in some, samples are lost
 AT_REST_MM = 1e-9
 LONGEST_LAG_S = 0.1
-STROKE_S = 0.5  # and the longest lag before it
+TRIAL_STROKE_S = 0.5  # and the longest lag before it
 LEAST_SPEED_MM_S = 40.0
 LOOP_BACKS = 5
 EARLIEST_S = 1e-3  # to which clocks of input and output agree
@@ -162,7 +162,7 @@ def stroke_latencies_s(seen: Watched, *, floor_g2: float) -> list[float | None]:
         times_s, speeds = seen.readings["time_s"], np.abs(seen.readings["speed_mm_s"])
         speeds = np.where(seen.readings["force_n"] > 0, speeds, 0.0)
         level = np.interp(bins, times_s, np.minimum(speeds, LOWEST_SPEED_MM_S))
-        past, length = round(LONGEST_LAG_S / LAG_BIN_S), round(STROKE_S / LAG_BIN_S)
+        past, length = round(LONGEST_LAG_S / LAG_BIN_S), round(TRIAL_STROKE_S / LAG_BIN_S)
         for at in range(past, power.size - length, length):
             part = slice(at - past, at + length)
             if level[part].max() > LEAST_SPEED_MM_S > 0.5 * level[part].min():

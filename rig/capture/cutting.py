@@ -20,9 +20,9 @@ from modeling.recordings.recording import clipped_samples
 from rig.capture.grid import NOWHERE, StrokeGrid
 from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, READING, SIMULATED
 
-SHORTEST_S = 0.1
+SHORTEST_PART_S = 0.1
 # Half of what spectra are high-passed at, so that the filter changes nothing that is modelled.
-HIGH_PASS_HZ = 5.0
+STROKE_HIGH_PASS_HZ = 5.0
 # Between readings further apart the hand's motion is unknown.
 LONGEST_GAP_S = 0.05
 # Of the full scale: the highest step of 16 bits, and converters that stop short of it.
@@ -108,20 +108,20 @@ class StrokeCutter:
         speed_delay_s: float = 0.0,
     ) -> None:
         check_rate(rate_hz)
-        if rate_hz * SHORTEST_S < 64:
+        if rate_hz * SHORTEST_PART_S < 64:
             raise InputError(
-                f"expected a rate of at least {64 / SHORTEST_S:g} Hz to cut pieces of "
-                f"{SHORTEST_S:g} s, got {rate_hz:g} Hz; record faster."
+                f"expected a rate of at least {64 / SHORTEST_PART_S:g} Hz to cut pieces of "
+                f"{SHORTEST_PART_S:g} s, got {rate_hz:g} Hz; record faster."
             )
-        if longest_s < 2 * SHORTEST_S:
+        if longest_s < 2 * SHORTEST_PART_S:
             raise InputError(
-                f"expected pieces of up to {2 * SHORTEST_S:g} s or more, got {longest_s:g} s; "
+                f"expected pieces of up to {2 * SHORTEST_PART_S:g} s or more, got {longest_s:g} s; "
                 "record longer."
             )
         self.grid = grid
         self._scale_g = g_per_fullscale
         self._delay_s = speed_delay_s
-        self._shortest = round(SHORTEST_S * rate_hz)
+        self._shortest = round(SHORTEST_PART_S * rate_hz)
         self._longest = round(longest_s * rate_hz)
         self._high_pass = _HighPass(rate_hz)
         self._waiting = _no_samples()
@@ -249,7 +249,7 @@ class _HighPass:
     def __init__(self, rate_hz: float) -> None:
         from scipy.signal import butter, sosfilt_zi
 
-        self._sections = butter(4, HIGH_PASS_HZ, btype="highpass", fs=rate_hz, output="sos")
+        self._sections = butter(4, STROKE_HIGH_PASS_HZ, btype="highpass", fs=rate_hz, output="sos")
         self._settled = sosfilt_zi(self._sections)
         self._state: Floats | None = None
 

@@ -39,13 +39,13 @@ from modeling.recordings.recording_set import (
     stated,
 )
 from rig.capture.coverage import Coverage
-from rig.capture.cutting import SHORTEST_S, StrokePart
+from rig.capture.cutting import SHORTEST_PART_S, StrokePart
 from rig.capture.grid import StrokeGrid
 from rig.capture.joining import joined, joined_samples
 
 PIECES = "pieces"
 TABLE_NAME = "pieces.tsv"
-COLUMNS = (
+PIECE_COLUMNS = (
     Column("file", description="Name of the WAV file in the folder", required=True),
     Column("texture", description="Name of the surface", required=True),
     *chosen(INDEX_COLUMNS, "speed_mm_s", "force_n"),
@@ -104,9 +104,9 @@ class Plan:
     def __post_init__(self) -> None:
         check_texture_name(self.texture)
         check_duration(self.wanted_s, self.rate_hz)
-        if self.wanted_s < 2 * SHORTEST_S:
+        if self.wanted_s < 2 * SHORTEST_PART_S:
             raise InputError(
-                f"expected at least {2 * SHORTEST_S:g} s of each condition, got "
+                f"expected at least {2 * SHORTEST_PART_S:g} s of each condition, got "
                 f"{self.wanted_s:g} s; record longer."
             )
 
@@ -201,7 +201,7 @@ class PieceStore:
             rows: list[Mapping[str, object]] = [row for _, row in _rows(table)]
             file = _new_name(table.parent, rows)
             rows.append(self._row(file, piece))
-            text = table_text(COLUMNS, rows, missing="")
+            text = table_text(PIECE_COLUMNS, rows, missing="")
             # The table last, once the piece is on disk for good.
             write_files(
                 {
@@ -258,7 +258,7 @@ class PieceStore:
                 "stroke there again."
             )
         for where, cells in rows:
-            row: dict[str, Any] = dict(typed(cells, COLUMNS, where))
+            row: dict[str, Any] = dict(typed(cells, PIECE_COLUMNS, where))
             if row["texture"] != self.plan.texture:
                 continue
             if (rate_hz := row["rate_hz"]) != self.plan.rate_hz:
@@ -361,7 +361,7 @@ class PieceStore:
             *(f"{piece.mean_force_n:.4g}", f"{piece.force_sd_n:.4g}"),
             *(bool(piece.simulated or self.plan.simulated), bool(piece.force_assumed)),
         )
-        return dict(zip(names(COLUMNS), values, strict=True))
+        return dict(zip(names(PIECE_COLUMNS), values, strict=True))
 
 
 def _check_folder(folder: Path) -> None:
@@ -382,7 +382,7 @@ def _rows(table: Path) -> list[tuple[str, dict[str, str]]]:
     """The rows as text, each with its place; numbers stay as they were written."""
     if not table.is_file():
         return []
-    rows = read_cells(table, COLUMNS)
+    rows = read_cells(table, PIECE_COLUMNS)
     if last := read_text(table, "a table").rpartition("\n")[2]:
         raise InputError(
             f"expected {table} to end with a whole line, got {shown(last)} at its end; the "

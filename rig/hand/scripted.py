@@ -20,7 +20,7 @@ from rig.live.memory import now_s
 
 RATE_HZ = 1000
 _LARGEST = 1e6  # of any number in a table
-COLUMNS = tuple(
+SCRIPT_COLUMNS = tuple(
     Column(name, unit=unit, description=told, limits=(-_LARGEST, _LARGEST), required=True)
     for name, unit, told in (
         ("time_s", "s", "Rising; the first moment is when the device is opened"),
@@ -91,9 +91,9 @@ class ScriptedTrajectory:
     @classmethod
     def load(cls, path: str | Path) -> ScriptedTrajectory:
         """From a table with the columns time_s, x_mm, y_mm and force_n."""
-        rows = read_table(path, COLUMNS)
+        rows = read_table(path, SCRIPT_COLUMNS)
         time_s, x_mm, y_mm, force_n = (
-            np.array([row[name] for row in rows], dtype=float) for name in names(COLUMNS)
+            np.array([row[name] for row in rows], dtype=float) for name in names(SCRIPT_COLUMNS)
         )
         return cls(time_s, x_mm, y_mm=y_mm, force_n=force_n)
 

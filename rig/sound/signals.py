@@ -15,7 +15,7 @@ import numpy as np
 from modeling.errors import InputError, shown
 from modeling.files.columns import chosen
 from modeling.files.reading import read_bytes
-from modeling.files.stimulus_table import COLUMNS, MANIFEST
+from modeling.files.stimulus_table import MANIFEST, STIMULUS_COLUMNS
 from modeling.files.tables import read_cells, typed
 from modeling.files.wav import read_wav
 from modeling.models.loading import load_model, made_from
@@ -23,12 +23,12 @@ from rig.interface import PreparedSignal, Stimulus
 
 RAMP_S = 0.02
 _SIGNAL = chosen(
-    COLUMNS,
+    STIMULUS_COLUMNS,
     *("file", "unit", "format", "full_scale_g", "sha256", "vibrator_sha256", "simulated"),
 )
 _WHERE = ("trajectory", "speed_mm_s", "force_n", "gain_db")
 _CONDITION = (*_WHERE, "vibrator_sha256")
-OF_SURFACES = (*_SIGNAL, *chosen(COLUMNS, "texture", "model", "model_sha256", *_WHERE))
+OF_SURFACES = (*_SIGNAL, *chosen(STIMULUS_COLUMNS, "texture", "model", "model_sha256", *_WHERE))
 
 
 def tone_burst(

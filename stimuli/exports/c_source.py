@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from modeling import InputError
 from modeling.rendering.plan import RenderPlan
 from stimuli.exports.layered import Layered
-from stimuli.sets.recipe import HIGHEST_RATE_HZ
+from stimuli.sets.recipe import HIGHEST_FILE_RATE_HZ
 
 # Noise is within ±√3, and a band-pass adds up a few of its samples.
 HEADROOM = 100.0
@@ -43,9 +43,9 @@ def licence(data: str) -> str:
 
 def check_rate(rate_hz: float) -> None:
     """Refuse an output rate beyond that of any converter."""
-    if rate_hz > HIGHEST_RATE_HZ:
+    if rate_hz > HIGHEST_FILE_RATE_HZ:
         raise InputError(
-            f"expected an output rate of at most {HIGHEST_RATE_HZ} Hz, got "
+            f"expected an output rate of at most {HIGHEST_FILE_RATE_HZ} Hz, got "
             f"{rate_hz:g}; no converter is faster, so reduce it."
         )
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from modeling.arrays import Floats
-from modeling.files.stimulus_table import COLUMNS, MANIFEST
+from modeling.files.stimulus_table import MANIFEST, STIMULUS_COLUMNS
 from modeling.files.tables import write_table
 from modeling.files.writing import write_text
 from stimuli.sets.rendering import steady_part
@@ -22,7 +22,7 @@ COMPENSATED = "compensated"
 
 @dataclass(frozen=True)
 class StimulusRow:
-    """One rendered file: the manifest's row; `COLUMNS` says what each field is (None: n/a)."""
+    """One rendered file: the row of the manifest, with a field for each of `STIMULUS_COLUMNS`."""
 
     file: str
     texture: str
@@ -75,6 +75,6 @@ def measured(vibration: Floats, rate_hz: float, *, written: Floats) -> dict[str,
 
 def write_manifest(folder: Path, stimuli: Sequence[StimulusRow]) -> None:
     """Write `manifest.tsv`, and `manifest.json` with what each column means."""
-    write_table(folder / MANIFEST, COLUMNS, map(vars, stimuli))
-    meanings = {column.name: column.description for column in COLUMNS}
+    write_table(folder / MANIFEST, STIMULUS_COLUMNS, map(vars, stimuli))
+    meanings = {column.name: column.description for column in STIMULUS_COLUMNS}
     write_text(folder / COLUMNS_FILE, json.dumps(meanings, indent=2) + "\n")

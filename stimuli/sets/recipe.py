@@ -27,7 +27,7 @@ Noise = Literal["independent", "frozen"]
 LevelMode = Literal["as modelled", "rms", "loudness"]
 
 LONGEST_SETTLING_S = 60.0
-HIGHEST_RATE_HZ = 768_000
+HIGHEST_FILE_RATE_HZ = 768_000
 HIGHEST_SEED = 2**63 - 1
 
 
@@ -166,7 +166,7 @@ def _listed(value: Any) -> Any:
     return [int(v) if isinstance(v, float) and v.is_integer() else v for v in values]
 
 
-OutputRate = Annotated[int, key(unit="Hz", ge=1, le=HIGHEST_RATE_HZ)]
+OutputRate = Annotated[int, key(unit="Hz", ge=1, le=HIGHEST_FILE_RATE_HZ)]
 Seed = Annotated[int, key(ge=0, le=HIGHEST_SEED)]
 
 

@@ -223,14 +223,14 @@ def read_answers(places: Mapping[str, Path], exclude: Sequence[str]) -> Response
         out, or the answers cannot be used.
     """
     from analysis.answers.loading import load_responses
-    from analysis.answers.responses import BETWEEN, leave_out
+    from analysis.answers.responses import SETUP_SEPARATOR, leave_out
     from analysis.answers.setups import pool_setups
     from experiments.sessions.bids import require_tables
 
     reasons = dict(map(_with_reason, exclude))
     setups = {}
     for name, place in places.items():
-        before = f"{name}{BETWEEN}" if name else ""
+        before = f"{name}{SETUP_SEPARATOR}" if name else ""
         without = {who.removeprefix(before) for who in reasons if who.startswith(before)}
         require_tables(
             place,
@@ -297,15 +297,15 @@ def validated(
         simulate_model_cell,
     )
     from benches.validation.procedures import cells, simulate_cell, validation_table
-    from benches.validation.ranks import KINDS, rank_table, simulate_ranks
+    from benches.validation.ranks import RANK_KINDS, rank_table, simulate_ranks
 
     settings: dict[str, int] = {"simulations": simulations, "seed": seed}
     listed, planted = cells(), model_cells()
     tasks = [partial(simulate_cell, cell, **settings) for cell in listed]
     of_model = [partial(simulate_model_cell, cell, **settings) for cell in planted]
-    ranks = [partial(simulate_ranks, kind, **settings) for kind in KINDS]
+    ranks = [partial(simulate_ranks, kind, **settings) for kind in RANK_KINDS]
     every = [*tasks, *of_model, *ranks]
-    names = [" ".join(map(str, cell)) for cell in (*listed, *planted)] + list(KINDS)
+    names = [" ".join(map(str, cell)) for cell in (*listed, *planted)] + list(RANK_KINDS)
     found: dict[int, Any] = {}
     with (
         progress("Validating", len(every)) as advance,

@@ -123,7 +123,7 @@ def chart_sources(
         For models without recordings, and a texture of which a folder holds no model.
     """
     from benches.chart.surfaces import (
-        FULL,
+        ALL_SURFACES,
         USUAL,
         recorded_sources,
         simulated_sources,
@@ -135,7 +135,7 @@ def chart_sources(
             "expected --recordings for the models that --models names, got none; give both."
         )
     given = recorded_sources(recordings, models, both_halves=full) + toolkit_sources(toolkit)
-    return given or simulated_sources(FULL if full else USUAL)
+    return given or simulated_sources(ALL_SURFACES if full else USUAL)
 
 
 def charted(

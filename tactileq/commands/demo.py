@@ -104,9 +104,9 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
 
 def demo_population(textures: Sequence[str]) -> Psychometrics:
     """People to whom simplified models differ in the magnitude of one texture, and nowhere else."""
-    from experiments.observers.psychometrics import SCALES, Psychometrics
+    from experiments.observers.psychometrics import RATED_SCALES, Psychometrics
 
-    planted = {texture: dict.fromkeys(SCALES, 0.0) for texture in textures}
+    planted = {texture: dict.fromkeys(RATED_SCALES, 0.0) for texture in textures}
     planted[PLANTED_TEXTURE]["magnitude_similarity"] = PLANTED_POINTS
     return Psychometrics(planted=planted)
 
@@ -177,14 +177,14 @@ class Benches(NamedTuple):
         from benches.atlas.cases import CASES
         from benches.chart.judging import judge
         from benches.chart.methods import BRIEF
-        from benches.chart.surfaces import FEW, simulated_sources
+        from benches.chart.surfaces import FEW_SURFACES, simulated_sources
         from benches.scenes.examples import compile_examples, drawn_example
 
         models = {result.texture: result.model for result in made}
         return cls(
             # One call, as what has one item alone is done by this process.
             mapped(_done, [partial(compile_examples, models), drawn_example]),
-            mapped(partial(judge, methods=BRIEF), simulated_sources(FEW)),
+            mapped(partial(judge, methods=BRIEF), simulated_sources(FEW_SURFACES)),
             mapped(partial(examine_column, CASES, full=False), columns_of(CASES, full=False)),
         )
 
@@ -197,7 +197,7 @@ class Benches(NamedTuple):
         from benches.atlas.section import stability_section
         from benches.chart.chart import chart_of
         from benches.chart.page import chart_section
-        from benches.chart.surfaces import FEW
+        from benches.chart.surfaces import FEW_SURFACES
         from benches.scenes.examples import Surface
         from benches.scenes.section import scene_section
         from stimuli.planted.textures import PlantedSurface
@@ -208,7 +208,7 @@ class Benches(NamedTuple):
                 self.scenes, advance, lambda found: found[0].compiled.scene.name
             )
         scenes = scene_section([*((one, surfaces) for one in compiled), drawn])
-        with progress("Speed against accuracy", FEW.drawn) as advance:
+        with progress("Speed against accuracy", FEW_SURFACES.drawn) as advance:
             judged = list(_reported(self.judged, advance, lambda one: one.source.name))
         with progress("Where methods fail", len(columns_of(CASES, full=False))) as advance:
             examined = list(_reported(self.examined, advance, lambda one: one.case.family))

@@ -65,14 +65,14 @@ def rig_calibrate(
 
 
 def _floor(rig: RigFile) -> None:
-    from rig.calibration.floor import SHORTEST_S, no_contact_floor
+    from rig.calibration.floor import SHORTEST_FLOOR_S, no_contact_floor
     from rig.calibration.measuring import Accelerometer
     from rig.calibration.opening import accelerometer_input
     from rig.calibration.steps import floor_figures
 
     with accelerometer_input(rig) as source:
         _ask("Put the pen down and touch nothing")
-        record = Accelerometer(source).record(2 * SHORTEST_S)
+        record = Accelerometer(source).record(2 * SHORTEST_FLOOR_S)
     floor = no_contact_floor(record.samples_g, rate_hz=record.rate_hz)
     print(f"at rest {1e3 * floor.rms_g:.2f} mg RMS from 10 to 1000 Hz, peak {floor.peak_g:.4f} g")
     bands = zip(floor.band_hz[::3], floor.band_rms_g[::3], strict=True)

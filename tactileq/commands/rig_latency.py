@@ -77,7 +77,7 @@ def _measured(
     from rig.calibration.measuring import Accelerometer
     from rig.calibration.opening import accelerometer_input, opened_sound
     from rig.calibration.trials import (
-        STROKE_S,
+        TRIAL_STROKE_S,
         loop_back_s,
         probe_texture,
         step_latencies_s,
@@ -94,7 +94,7 @@ def _measured(
         seconds = write_steps(folder / "steps.tsv", trials, seed=seed)
         settings = replace(settings, kind="scripted", script=str(folder / "steps.tsv"))
     else:
-        seconds = 1.5 * trials * STROKE_S
+        seconds = 1.5 * trials * TRIAL_STROKE_S
     with (
         accelerometer_input(rig) as source,
         Live.create() as live,

@@ -18,7 +18,7 @@ from experiments.study.study import SHIPPED_STUDY, Study
 from modeling import Threshold, simplify
 from modeling.files.columns import Column
 from modeling.files.describing import schema
-from modeling.files.stimulus_table import COLUMNS
+from modeling.files.stimulus_table import STIMULUS_COLUMNS
 from modeling.files.tables import read_table
 from stimuli.planted.textures import planted_texture
 from tests.refusals import check_refusal
@@ -218,7 +218,7 @@ def test_a_stimulus_set_is_presented_in_the_place_of_models(place: Path, main: M
     shown = {row["model_sha256"] for rows in tables for row in rows if row["surface"] == "virtual"}
     files = {
         row["sha256"]
-        for row in read_table(place / "set/manifest.tsv", COLUMNS)
+        for row in read_table(place / "set/manifest.tsv", STIMULUS_COLUMNS)
         if row["texture"] in ("canvas", "MDF")
     }
     assert shown == files

@@ -11,7 +11,7 @@ import soundfile
 from PIL import Image
 
 from modeling import Limits, Vibrator, compensation_for
-from modeling.files.stimulus_table import COLUMNS
+from modeling.files.stimulus_table import STIMULUS_COLUMNS
 from modeling.files.tables import read_table
 from stimuli.exports.c_header import write_c_header
 from stimuli.planted.textures import planted_texture
@@ -72,7 +72,7 @@ def test_what_is_found_goes_into_stimuli_and_exports(main, tmp_path: Path, recor
     found = Vibrator.load(tmp_path / "pen.json")
     done = main("stimuli", "canvas.json", "--vibrator", "pen.json", "--rate", 22050, "--out", "set")
     assert done.returncode == 0, done.stderr
-    (row,) = read_table(tmp_path / "set/manifest.tsv", COLUMNS)
+    (row,) = read_table(tmp_path / "set/manifest.tsv", STIMULUS_COLUMNS)
     assert row["vibrator"] == "compensated"
     inputs = json.loads((tmp_path / "set/provenance.json").read_text())["inputs_sha256"]
     assert set(inputs) == {"canvas.json", "pen.json"}

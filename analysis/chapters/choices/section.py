@@ -9,7 +9,7 @@ import pandas as pd
 
 from analysis.chapters.chapter import Answered, Stream, named_by, who_took_part
 from analysis.chapters.choices.figure import figure_correct_rates
-from analysis.labels import ALL_TEXTURES, TASKS, names_or_none, sentence_case
+from analysis.labels import ALL_TEXTURES, TASK_TITLES, names_or_none, sentence_case
 from analysis.page.outcomes import Outcome, Weight
 from analysis.page.page import Picture, Table
 from analysis.page.sections import Section, of_task
@@ -54,7 +54,7 @@ def _section(answered: Answered, stream: Stream) -> Section:
     found = [one for one in answered.judged_in(task) if one.claim.measure == "correct"]
     section = Section(
         "choices",
-        f"{sentence_case(TASKS[task])}: right answers",
+        f"{sentence_case(TASK_TITLES[task])}: right answers",
         (
             *(_rates_picture(one, chance=chance, simulated=simulated) for one in found),
             _rates_table(rates, chance=chance, simulated=simulated),
@@ -75,7 +75,7 @@ def _rates_picture(found: ClaimFound, *, chance: float, simulated: bool) -> Pict
     line = f"; {UNKNOWN_CHANCE}." if np.isnan(chance) else "; dashed: chance."
     return Picture(
         named_by("correct_rates", found.claim.models),
-        f"Correct rates of the {TASKS[task]}, {reference} and {other} models",
+        f"Correct rates of the {TASK_TITLES[task]}, {reference} and {other} models",
         "Bars: means over participants with 95% confidence intervals; points: participants"
         f"{line}{paper}",
         figure_correct_rates(found, chance=chance, simulated=simulated),
@@ -113,7 +113,7 @@ def rate_outcomes(rates: pd.DataFrame, task: str, *, chance: float) -> list[Outc
     return [
         Outcome(
             Weight.DESCRIPTIVE if np.isnan(chance) else Weight.SECONDARY,
-            f"{sentence_case(TASKS[task])}, {model} model: {compared(of_model)}.",
+            f"{sentence_case(TASK_TITLES[task])}, {model} model: {compared(of_model)}.",
         )
         for model, of_model in rates.groupby("model", sort=False)
     ]

@@ -11,7 +11,7 @@ from analysis.chapters.claims.sentences import (
     difference,
     overall_row,
 )
-from analysis.labels import MEASURES, TASKS
+from analysis.labels import MEASURES, TASK_TITLES
 from analysis.statistics.caveats import (
     BOUNDS_WITHHELD,
     DIFFERENCES,
@@ -72,8 +72,8 @@ def unfinished_tasks(responses: Responses) -> list[str]:
         done, planned = responses.done(task), responses.planned[task]
         under_way = ", ".join(sorted(responses.under_way.get(task, ())))
         lines.append(
-            f"{TASKS[task]}: {done.participants} of {planned.participants} planned participants, "
-            f"{done.sessions} of {planned.sessions} planned sessions"
+            f"{TASK_TITLES[task]}: {done.participants} of {planned.participants} planned "
+            f"participants, {done.sessions} of {planned.sessions} planned sessions"
             + (f"; answers are missing in sessions of {under_way}" if under_way else "")
         )
     return lines
@@ -127,7 +127,7 @@ def _what(one: ClaimFound, found: Sequence[ClaimFound]) -> str:
     claim, what = one.claim, MEASURES[one.claim.measure]
     others = [each.claim for each in found if each.claim.measure == claim.measure]
     if len({each.task for each in others}) > 1:
-        what += f" of the {TASKS[claim.task]}"
+        what += f" of the {TASK_TITLES[claim.task]}"
     if len({each.models for each in others}) > 1:
         what += f" ({claim.models[1]})"
     return f"the {what}" if claim.measure == "correct" else what

@@ -9,7 +9,7 @@ import numpy as np
 from analysis.answers.plan import EQUIVALENCE, MODEL_RULE, Claim
 from analysis.answers.responses import Responses
 from analysis.chapters.claims.model_sentences import decided_by_tests, model_methods
-from analysis.labels import MEASURES, TASKS
+from analysis.labels import MEASURES, TASK_TITLES
 from analysis.statistics.compared_answers import chance_of
 from analysis.statistics.described_verdicts import incomplete
 from analysis.statistics.verdicts import ClaimFound
@@ -115,8 +115,9 @@ def _who(responses: Responses, claims: Sequence[Claim]) -> str:
     kind = "simulated participant" if responses.simulated_participants else "participant"
     rig = " at a simulated rig" if responses.simulated_rig else ""
     parts = [
-        f"{counted(responses.done(task).participants, kind)}{rig} took part in the {TASKS[task]} "
-        f"with {counted(responses.answers[task]['texture'].nunique(), 'texture')}"
+        f"{counted(responses.done(task).participants, kind)}{rig} took part in the "
+        f"{TASK_TITLES[task]} with "
+        f"{counted(responses.answers[task]['texture'].nunique(), 'texture')}"
         for task in tasks
     ]
     text = "; ".join(parts)

@@ -23,7 +23,7 @@ from analysis.chapters.confusions.similarity_choice import (
     similarity_choice,
 )
 from analysis.columns import MODEL, TEXTURE, P
-from analysis.labels import TASKS, sentence_case
+from analysis.labels import TASK_TITLES, sentence_case
 from analysis.page.outcomes import Outcome, Weight, described
 from analysis.page.page import Fold, Item, Picture, Table
 from analysis.page.sections import Section, of_task
@@ -61,7 +61,7 @@ SIMILARITY_COLUMNS = (
     Column("similarity"),
 )
 BIAS_COLUMNS = (MODEL, TEXTURE, Column("bias", "response bias"))
-FIT_COLUMNS = (
+CHOICE_FIT_COLUMNS = (
     MODEL,
     Column("deviance"),
     Column("df"),
@@ -126,10 +126,10 @@ def confusion_section(
             for model, matrix in matrices.items()
             if matrix.counts.any()
         }
-    whose = f"{sentence_case(TASKS[stream.task])}: " * bool(stream.ending)
+    whose = f"{sentence_case(TASK_TITLES[stream.task])}: " * bool(stream.ending)
     section = Section(
         "confusions",
-        f"Confusions in the {TASKS[stream.task]}",
+        f"Confusions in the {TASK_TITLES[stream.task]}",
         (
             _picture(matrices, simulated=simulated),
             _change_table(change, simulated=simulated),
@@ -230,7 +230,7 @@ def _similarity_items(
         return ()
     fit = pd.DataFrame(
         [(m, c.deviance, c.df, c.p, c.p_simulated) for m, c in choices.items()],
-        columns=names(FIT_COLUMNS),
+        columns=names(CHOICE_FIT_COLUMNS),
     )
     pairs = [
         (model, textures[i], textures[j], value)
@@ -262,7 +262,7 @@ def _similarity_items(
         "asymmetric beyond response biases. p of simulated tables where counts are too few for χ². "
         "Answers of one participant are treated as independent here, so p tends to be too small.",
         fit,
-        FIT_COLUMNS,
+        CHOICE_FIT_COLUMNS,
         simulated,
     )
     tables = (

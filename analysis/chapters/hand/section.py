@@ -14,13 +14,13 @@ import pandas as pd
 from analysis.chapters.chapter import Answered
 from analysis.chapters.hand.figure import figure_hand
 from analysis.chapters.hand.statistics import (
+    HAND_PARTICIPANT_COLUMNS,
     HAND_TEST_COLUMNS,
-    PARTICIPANT_COLUMNS,
     hand_by_participant,
     hand_means,
     hand_tests,
 )
-from analysis.labels import TASKS, signed
+from analysis.labels import TASK_TITLES, signed
 from analysis.page.outcomes import Outcome, Weight
 from analysis.page.page import Fold, Picture, Table
 from analysis.page.sections import Section, of_pairs
@@ -28,7 +28,7 @@ from modeling.files.columns import without
 
 ALPHA = 0.05
 TESTS_SHOWN = without(HAND_TEST_COLUMNS, "se_reference", "se_other")
-MEASURES = {
+MEASURE_WORDS = {
     "speed_mm_s": ("speed while touching", "mm/s"),
     "force_n": ("force while touching", "N"),
     "contact_s": ("time in contact per trial", "s"),
@@ -116,13 +116,13 @@ def _listed(tests: pd.DataFrame) -> str:
 
 
 def _difference(row: Mapping[Hashable, Any]) -> str:
-    words, unit = MEASURES[row["measure"]]
+    words, unit = MEASURE_WORDS[row["measure"]]
     digits = 1 if row["measure"] == "speed_mm_s" else 2
     mean, low, high = (
         signed(row[name], digits) for name in ("mean_difference", "ci_low", "ci_high")
     )
     interval = f" (95% CI {low} to {high})" if np.isfinite(row["ci_low"]) else ""
-    return f"{words} in the {TASKS[row['task']]} {mean} {unit}".rstrip() + interval
+    return f"{words} in the {TASK_TITLES[row['task']]} {mean} {unit}".rstrip() + interval
 
 
 def _picture(
@@ -130,7 +130,7 @@ def _picture(
 ) -> Picture:
     return Picture(
         f"hand_{task}",
-        f"Speed and force of the hand by model, {TASKS[task]}",
+        f"Speed and force of the hand by model, {TASK_TITLES[task]}",
         "Points: participants, with a line between the two models of each, and the mean with its "
         "95% confidence interval. Means over the textures that a participant judged with both "
         "models.",
@@ -144,7 +144,8 @@ def _tables(
 ) -> tuple[Table, Fold]:
     reference, other = models
     labels = {
-        name: f"{words} ({unit})".replace(" ()", "") for name, (words, unit) in MEASURES.items()
+        name: f"{words} ({unit})".replace(" ()", "")
+        for name, (words, unit) in MEASURE_WORDS.items()
     }
     paired = Table(
         "hand_tests",
@@ -152,7 +153,7 @@ def _tables(
         f"Paired t-tests, {other} − {reference}. A participant's value is the mean over the "
         "textures judged with both models. Only virtual surfaces, and only trials that were "
         "answered. Not corrected for the number of tests.",
-        tests.assign(measure=tests["measure"].map(labels), task=tests["task"].map(TASKS)),
+        tests.assign(measure=tests["measure"].map(labels), task=tests["task"].map(TASK_TITLES)),
         TESTS_SHOWN,
         simulated,
     )
@@ -162,8 +163,8 @@ def _tables(
         "Hand movement of each participant",
         f"Reference: {reference} models; other: {other} models. Means over the textures judged "
         "with both. n/a: not measured, or not stored by any session.",
-        participants.assign(task=participants["task"].map(TASKS)),
-        PARTICIPANT_COLUMNS,
+        participants.assign(task=participants["task"].map(TASK_TITLES)),
+        HAND_PARTICIPANT_COLUMNS,
         simulated,
     )
     return paired, Fold("Hand movement of each participant", (each,))

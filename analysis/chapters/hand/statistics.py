@@ -10,7 +10,7 @@ from dataclasses import asdict
 import numpy as np
 import pandas as pd
 
-from analysis.answers.hand import MEASURES
+from analysis.answers.hand import HAND_MEASURES
 from analysis.columns import P
 from analysis.statistics.draws import generators
 from analysis.statistics.paired import paired_test
@@ -38,7 +38,7 @@ HAND_TEST_COLUMNS = (
     Column("note"),
 )
 
-PARTICIPANT_COLUMNS = (
+HAND_PARTICIPANT_COLUMNS = (
     Column("task", is_name=True),
     Column("participant_id", "participant", is_name=True),
     Column("speed_mm_s_reference", "speed, reference", "mm/s"),
@@ -71,13 +71,13 @@ def hand_means(hand: pd.DataFrame, *, models: tuple[str, str]) -> pd.DataFrame:
         counts once; NaN where no texture has a value with both models.
     """
     long = hand[hand["model"].isin(models)].melt(
-        ["task", "participant_id", "texture", "model"], list(MEASURES), "measure"
+        ["task", "participant_id", "texture", "model"], list(HAND_MEASURES), "measure"
     )
     both = long.set_index([*_CELL, "texture", "model"])["value"].unstack("model")
     both = both.reindex(columns=list(models)).set_axis(["reference", "other"], axis=1)
     means = both.where(both.notna().all(axis=1)).groupby(_CELL).mean().reset_index()
     everybody = hand[["task", "participant_id"]].drop_duplicates()
-    rows = everybody.merge(pd.DataFrame({"measure": MEASURES}), how="cross")
+    rows = everybody.merge(pd.DataFrame({"measure": HAND_MEASURES}), how="cross")
     return rows.merge(means, how="left")[[*_CELL, "reference", "other"]]
 
 
@@ -92,11 +92,11 @@ def hand_by_participant(means: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        `PARTICIPANT_COLUMNS`.
+        `HAND_PARTICIPANT_COLUMNS`.
     """
     wide = means.pivot(index=["task", "participant_id"], columns="measure")
     wide = wide.set_axis(wide.columns.map(lambda pair: f"{pair[1]}_{pair[0]}"), axis=1)
-    return wide.reset_index()[names(PARTICIPANT_COLUMNS)]
+    return wide.reset_index()[names(HAND_PARTICIPANT_COLUMNS)]
 
 
 def hand_tests(

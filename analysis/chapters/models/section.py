@@ -19,8 +19,8 @@ from analysis.spectra.layers_over_grid import layers_over_speed
 from analysis.textures.between import LEFT_OUT_COLUMNS, left_out_summary
 from analysis.textures.likeness import GFC_COLUMNS
 from analysis.textures.results import (
-    FIT_COLUMNS,
-    VERDICT_COLUMNS,
+    LAYER_VERDICT_COLUMNS,
+    MODEL_FIT_COLUMNS,
     TextureResult,
     fit_table,
     reference_condition,
@@ -37,7 +37,7 @@ GFC_CAUTION = (
     "dB."
 )
 VERDICTS_SHOWN = chosen(
-    VERDICT_COLUMNS,
+    LAYER_VERDICT_COLUMNS,
     *("layer", "verdict", "reason", "distance_db", "worst_speed_mm_s", "worst_force_n"),
     *("worst_frequency_hz", "flip_probability"),
 )
@@ -99,7 +99,7 @@ def _fit_items(textures: Sequence[TextureResult]) -> tuple[Item, ...]:
         "a response half-way between conditions from the mean of the logarithms at its "
         "conditions; above 4 dB a model must not be used between its conditions.",
         fits,
-        without(FIT_COLUMNS, "simulated"),
+        without(MODEL_FIT_COLUMNS, "simulated"),
         any(result.simulated for result in textures),
     )
     return (table,)

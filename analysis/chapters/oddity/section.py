@@ -15,7 +15,7 @@ from analysis.answers.responses import Responses
 from analysis.chapters.chapter import Answered, who_took_part
 from analysis.chapters.oddity.dprime import d_primes, oddity_d_prime
 from analysis.columns import TEXTURE
-from analysis.labels import ALL_TEXTURES, TASKS, sentence_case
+from analysis.labels import ALL_TEXTURES, TASK_TITLES, sentence_case
 from analysis.page.outcomes import Outcome, Weight
 from analysis.page.page import Table
 from analysis.page.sections import Section, of_task
@@ -88,7 +88,7 @@ def oddity_section(
     outcomes = tuple(Outcome(Weight.SECONDARY, _in_words(row, task)) for row in overall)
     section = Section(
         "oddity",
-        f"{sentence_case(TASKS[task])}: d′",
+        f"{sentence_case(TASK_TITLES[task])}: d′",
         (table,),
         outcomes=outcomes,
         done=(done,),
@@ -142,8 +142,8 @@ def _in_words(row: Mapping[Hashable, Any], task: str) -> str:
             f" ({_number(row['d_prime_low'])} to {_number(row['d_prime_high'])})",
         )
     text = (
-        f"{sentence_case(TASKS[task])}, {row['claim']}: {row['share']:.1%} of the answers were "
-        f"right over all textures{intervals[0]}, d′ {_number(row['d_prime'])}{intervals[1]}"
+        f"{sentence_case(TASK_TITLES[task])}, {row['claim']}: {row['share']:.1%} of the answers "
+        f"were right over all textures{intervals[0]}, d′ {_number(row['d_prime'])}{intervals[1]}"
     )
     if np.isfinite(row["bound"]):
         text += f"; upper bound {row['bound']:.1%}, d′ {_number(row['bound_d_prime'])}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from analysis.chapters.chapter import Answered, Stream, named_by, who_took_part
 from analysis.chapters.ratings.figure import figure_ratings
-from analysis.labels import TASKS, sentence_case
+from analysis.labels import TASK_TITLES, sentence_case
 from analysis.page.page import Picture
 from analysis.page.sections import Section, of_task
 from modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
@@ -40,7 +40,7 @@ def _section(answered: Answered, stream: Stream) -> Section:
     ]
     section = Section(
         "ratings",
-        f"{sentence_case(TASKS[task])}: ratings",
+        f"{sentence_case(TASK_TITLES[task])}: ratings",
         tuple(pictures),
         done=(done,),
         tiles=(tile,),

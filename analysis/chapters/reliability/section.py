@@ -23,7 +23,7 @@ from analysis.chapters.reliability.statistics import (
     same_ratings,
     within_participant_sd,
 )
-from analysis.labels import SCALES, TASKS
+from analysis.labels import SCALES, TASK_TITLES
 from analysis.page.outcomes import Outcome, Weight
 from analysis.page.page import Item, Table
 from analysis.page.sections import Section
@@ -128,7 +128,7 @@ def careless_signs(
 def _scale_words(task: str, scale: str, given: Mapping[str, pd.DataFrame]) -> str:
     """A scale in words, with the task unless it is the first one with this scale."""
     first = next(other for other, table in given.items() if scale in table)
-    return SCALES[scale] + f" in the {TASKS[task]}" * (task != first)
+    return SCALES[scale] + f" in the {TASK_TITLES[task]}" * (task != first)
 
 
 def _agreement(
@@ -174,7 +174,7 @@ def _careless_table(careless: pd.DataFrame, *, simulated: bool) -> Table:
         f"Listed, never excluded: all ratings of a scale equal; every answer within {FASTEST_S:g} "
         "s; right answers not above chance and below the rate of the others, while the group is "
         "above chance. Participants with at least five answers.",
-        careless.replace({"task": TASKS}),
+        careless.replace({"task": TASK_TITLES}),
         CARELESS_COLUMNS,
         simulated,
     )

@@ -19,14 +19,14 @@ from analysis.statistics.paired import (
 from modeling.arrays import Floats
 from modeling.files.columns import Column, names
 
-MEASURES = {
+SPEED_MEASURES = {
     "time_s": "response time (s, geometric mean)",
     "share_correct": "share of right answers",
     "lisas_s": "LISAS (s)",
 }
 RATIO, DIFFERENCE = "ratio", "difference"
 
-COMPARISON_COLUMNS = (
+SPEED_COMPARISON_COLUMNS = (
     Column("measure", is_name=True),
     Column("n", "participants"),
     Column("mean_reference", "mean of reference"),
@@ -87,20 +87,20 @@ def compare_models(
     Returns
     -------
     DataFrame
-        `COMPARISON_COLUMNS`, rows `MEASURES`. Time is tested in logarithms: its means are
-        geometric, its effect is the ratio other/reference; the others are differences
+        `SPEED_COMPARISON_COLUMNS`, rows `SPEED_MEASURES`. Time is tested in logarithms: its means
+        are geometric, its effect is the ratio other/reference; the others are differences
         other − reference. `excluded` names who has no value with one of the models.
     """
     scores = participant_scores(answers, models=models)
     rows = []
-    for measure in MEASURES:
+    for measure in SPEED_MEASURES:
         wide = scores.pivot(index="participant_id", columns="model", values=measure)
         wide = wide.reindex(columns=list(models))
         whole = wide.dropna()
         excluded = ", ".join(sorted(set(answers["participant_id"]) - set(whole.index)))
         row = {"measure": measure, "excluded": excluded}
         rows.append(row | _compared(whole.to_numpy(dtype=float), measure == "time_s", rng=rng))
-    return pd.DataFrame(rows, columns=names(COMPARISON_COLUMNS))
+    return pd.DataFrame(rows, columns=names(SPEED_COMPARISON_COLUMNS))
 
 
 def _compared(values: Floats, as_ratio: bool, *, rng: np.random.Generator) -> dict[str, object]:

@@ -22,7 +22,7 @@ from modeling.arrays import Floats
 from modeling.files.columns import Column, names
 
 PARTICIPANT = Column("participant_id", "participant", is_name=True)
-CELL_COLUMNS = (
+TEXTURE_TIME_COLUMNS = (
     PARTICIPANT,
     TEXTURE,
     MODEL,
@@ -76,7 +76,7 @@ def speed_and_accuracy(answers: pd.DataFrame, *, models: Sequence[str]) -> pd.Da
     Returns
     -------
     DataFrame
-        `CELL_COLUMNS`; times of right and of wrong answers are NaN where there is none.
+        `TEXTURE_TIME_COLUMNS`; times of right and of wrong answers are NaN where there is none.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def speed_and_accuracy(answers: pd.DataFrame, *, models: Sequence[str]) -> pd.Da
         median_right_s=("right_s", "median"),
         median_wrong_s=("wrong_s", "median"),
     ).reset_index()
-    return _in_order(table, models)[names(CELL_COLUMNS)]
+    return _in_order(table, models)[names(TEXTURE_TIME_COLUMNS)]
 
 
 def participant_scores(answers: pd.DataFrame, *, models: Sequence[str]) -> pd.DataFrame:

@@ -12,9 +12,9 @@ import pandas as pd
 
 from analysis.chapters.chapter import Answered, Stream
 from analysis.chapters.speed.comparison import (
-    COMPARISON_COLUMNS,
-    MEASURES,
     RIGHT_WRONG_COLUMNS,
+    SPEED_COMPARISON_COLUMNS,
+    SPEED_MEASURES,
     TIME_RATIO_COLUMNS,
     compare_models,
     right_and_wrong,
@@ -22,15 +22,15 @@ from analysis.chapters.speed.comparison import (
 )
 from analysis.chapters.speed.figure import figure_conditional_accuracy, figure_speed_accuracy
 from analysis.chapters.speed.scores import (
-    CELL_COLUMNS,
     CONDITIONAL_COLUMNS,
     SCORE_COLUMNS,
+    TEXTURE_TIME_COLUMNS,
     conditional_accuracy,
     participant_scores,
     score_means,
     speed_and_accuracy,
 )
-from analysis.labels import TASKS, sentence_case
+from analysis.labels import TASK_TITLES, sentence_case
 from analysis.page.outcomes import Outcome, Weight
 from analysis.page.page import Fold, Item, Picture, Table
 from analysis.page.sections import Section, of_pairs
@@ -53,7 +53,7 @@ _DETAILS = {
         "Over the textures judged with all models shown, weighted equally; LISAS over trials.",
         SCORE_COLUMNS,
     ),
-    "cells": ("By texture and model", "Median times.", CELL_COLUMNS),
+    "cells": ("By texture and model", "Median times.", TEXTURE_TIME_COLUMNS),
     "quantiles": (
         "Right answers by quantile of time",
         "Means over participants with 95% intervals over them.",
@@ -125,7 +125,7 @@ def _pictures(
     scores = participant_scores(answers, models=models)
     points = Picture(
         f"speed_accuracy_{task}",
-        f"Time against right answers, {TASKS[task]}",
+        f"Time against right answers, {TASK_TITLES[task]}",
         "Farther left is faster, higher is more accurate: lower and farther left is a "
         "speed–accuracy trade-off, not an advantage. Means over the textures judged with all "
         "models shown, with equal weight for each texture.",
@@ -137,7 +137,7 @@ def _pictures(
         return [points]
     conditional = Picture(
         f"conditional_accuracy_{task}",
-        f"Right answers by response time, {TASKS[task]}",
+        f"Right answers by response time, {TASK_TITLES[task]}",
         "Conditional accuracy: each participant's answers from the fastest to the slowest group. "
         "All textures are pooled, so textures that are difficult and therefore slow make the line "
         "fall.",
@@ -158,7 +158,7 @@ def _compared(
     reference, other = models
     comparison = compare_models(answers, models=models, rng=stream.rng)
     ratios = time_ratios(answers, models=models, rng=stream.rng)
-    whose = f"{sentence_case(TASKS[stream.task])}: " * bool(stream.ending)
+    whose = f"{sentence_case(TASK_TITLES[stream.task])}: " * bool(stream.ending)
     paired = Table(
         f"speed_accuracy{stream.ending}",
         f"{whose}time, accuracy and both together" if whose else "Time, accuracy and both together",
@@ -167,8 +167,8 @@ def _compared(
         "the weighted share of wrong ones (Vandierendonck 2017), low where answers are fast and "
         "right; it does not settle a trade-off. Not corrected for the number of tests; no claim "
         "rests on them.",
-        comparison.replace({"measure": MEASURES}),
-        COMPARISON_COLUMNS,
+        comparison.replace({"measure": SPEED_MEASURES}),
+        SPEED_COMPARISON_COLUMNS,
         simulated,
     )
     mixed = Table(
@@ -213,7 +213,7 @@ def _details(
         "quantiles": conditional_accuracy(answers, models=models),
     }
     return Fold(
-        f"Times and right answers of each participant, {TASKS[task]}",
+        f"Times and right answers of each participant, {TASK_TITLES[task]}",
         tuple(
             Table(f"speed_{name}_{task}", *_DETAILS[name][:2], frame, _DETAILS[name][2], simulated)
             for name, frame in frames.items()

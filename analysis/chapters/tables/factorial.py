@@ -33,7 +33,7 @@ ANOVA_COLUMNS = (
     Column("generalized_eta_squared", "generalized η²", format=".3f"),
     Column("n", "participants"),
 )
-CELL_COLUMNS = (
+CONDITION_COLUMNS = (
     Column("condition", is_name=True),
     Column("n", "participants"),
     Column("mean"),

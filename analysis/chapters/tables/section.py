@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from analysis.answers.imported import ImportedAnswers
 from analysis.chapters.tables.factorial import (
     ANOVA_COLUMNS,
-    CELL_COLUMNS,
+    CONDITION_COLUMNS,
     PAIR_COLUMNS,
     PARTICIPANT_CELL_COLUMNS,
     CompleteCells,
@@ -90,7 +90,7 @@ def _condition_section(imported: ImportedAnswers, cells: pd.DataFrame) -> Sectio
         "Mean over participants, each counting once, with a 95% interval (Student's t over "
         "participants).",
         means,
-        CELL_COLUMNS,
+        CONDITION_COLUMNS,
         False,
     )
     own = Table(

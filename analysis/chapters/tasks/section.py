@@ -10,7 +10,7 @@ import pandas as pd
 
 from analysis.answers.responses import Responses
 from analysis.chapters.chapter import Answered, who_took_part
-from analysis.labels import TASKS, sentence_case
+from analysis.labels import TASK_TITLES, sentence_case
 from analysis.page.page import Table
 from analysis.page.sections import Section
 from analysis.statistics.compared_answers import is_oddity
@@ -38,7 +38,7 @@ def sections(answered: Answered) -> list[Section]:
             found.append(
                 Section(
                     f"task-{task}",
-                    sentence_case(TASKS[task]),
+                    sentence_case(TASK_TITLES[task]),
                     (_asked_table(answered.responses, task),),
                     done=(done,),
                     tiles=(tile,),
@@ -57,7 +57,7 @@ def _asked_table(responses: Responses, task: str) -> Table:
     rows = [(what, there, wanted or np.nan) for what, (there, wanted) in counts.items()]
     return Table(
         f"asked_{task}",
-        f"The {TASKS[task]}: completed and planned",
+        f"The {TASK_TITLES[task]}: completed and planned",
         "Without participants who dropped out. n/a: not stated in the data.",
         pd.DataFrame(rows, columns=names(ASKED_COLUMNS)),
         ASKED_COLUMNS,

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from benches.validation.people.drawn import (
     BOUNDS,
-    CHOICE,
-    ODDITY,
-    TEXTURES,
+    CHOICE_KIND,
+    N_TEXTURES,
+    ODDITY_KIND,
     DrawnStudies,
     Shape,
     Situation,
@@ -30,7 +30,7 @@ from benches.validation.people.drawn import (
 )
 from modeling.arrays import Floats
 
-CHANCE_OF_THREE, CHANCE_OF_SEVEN = 1 / 3, 1 / TEXTURES
+CHANCE_OF_THREE, CHANCE_OF_SEVEN = 1 / 3, 1 / N_TEXTURES
 CARELESS, LAPSES = 0.2, 0.1  # shares of people, and of trials
 
 ODDITY_REPEATS, CATCHES, CAUGHT = 6, 6, 0.97  # per texture; catch trials; share right in these
@@ -42,7 +42,7 @@ SLIGHT = 0.42  # of those who feel a little
 
 CHOICE_REPEATS = 3
 # How much of a texture's evidence the others get, by distance in a row of textures.
-SIMILARITY = 0.5 ** np.abs(np.subtract.outer(np.arange(TEXTURES), np.arange(TEXTURES)))
+SIMILARITY = 0.5 ** np.abs(np.subtract.outer(np.arange(N_TEXTURES), np.arange(N_TEXTURES)))
 CHOICE_LEARNING = 0.1  # share of d′ gained within a day, and from one day to the next
 CHOICE_SPREAD, CHANGE_SPREAD = 0.25, 0.12  # SD of log d′ and of its change between people
 BASE, HIGH_BASE = 0.6, 0.92  # mean share right with the reference
@@ -76,7 +76,7 @@ def _oddity_factors(orders: Floats) -> Floats:
 def _oddity_table() -> tuple[Floats, Floats]:
     """d′ of a person, and their share of right answers over all textures and positions."""
     grid = np.linspace(0, 20, 801)
-    positions = np.linspace(0, 1, TEXTURES * ODDITY_REPEATS + CATCHES)
+    positions = np.linspace(0, 1, N_TEXTURES * ODDITY_REPEATS + CATCHES)
     factors = np.outer(DIFFICULTY, _oddity_factors(positions)).ravel()
     single = triangular_share(grid)
     return grid, np.array([np.interp(one * factors, grid, single).mean() for one in grid])
@@ -107,8 +107,8 @@ class _Oddity:
     lapses: float = 0.0
 
     def __call__(self, rng: np.random.Generator, shape: Shape) -> DrawnStudies:
-        cells = (*shape, TEXTURES, 1, ODDITY_REPEATS)
-        own = TEXTURES * ODDITY_REPEATS
+        cells = (*shape, N_TEXTURES, 1, ODDITY_REPEATS)
+        own = N_TEXTURES * ODDITY_REPEATS
         positions = shuffled(rng, (*shape, own + CATCHES))[..., :own]
         orders = (positions / (own + CATCHES - 1)).reshape(cells)
         feel = rng.random(shape) < self.feeling
@@ -144,7 +144,7 @@ class _Oddity:
 
     def _outside(self) -> float:
         """Share of those who feel it; d′ is log-normal, and the share of right grows with it."""
-        bound = BOUNDS[ODDITY][1]
+        bound = BOUNDS[ODDITY_KIND][1]
         if self.spread == 0:
             return float(self.excess > bound)
         grid, shares = _oddity_table()
@@ -184,8 +184,8 @@ def strongest_shares(d_prime: Floats) -> Floats:
     nodes, weights = np.polynomial.legendre.leggauss(80)
     x = 8 * nodes  # −8 … 8 around d′
     density = 8 * weights * np.exp(-(x**2) / 2) / sqrt(2 * pi)
-    shares = np.empty((len(d_prime), TEXTURES))
-    for texture in range(TEXTURES):
+    shares = np.empty((len(d_prime), N_TEXTURES))
+    for texture in range(N_TEXTURES):
         others = np.delete(SIMILARITY[texture], texture)
         ahead = np.outer(d_prime, 1 - others)[..., None] + x
         shares[:, texture] = (ndtr(ahead).prod(axis=1) * density).sum(axis=-1)
@@ -196,7 +196,7 @@ def strongest_shares(d_prime: Floats) -> Floats:
 def _choice_table() -> tuple[Floats, Floats]:
     """d′ of a person, and their share of right answers over textures, positions and days."""
     grid = np.linspace(0, 40, 801)
-    positions = np.linspace(0, 1, TEXTURES * CHOICE_REPEATS)
+    positions = np.linspace(0, 1, N_TEXTURES * CHOICE_REPEATS)
     factors = _choice_factors(positions[:, None], np.array([0.0, 1.0])).ravel()
     single = strongest_shares(grid).mean(axis=1)
     return grid, np.array([np.interp(one * factors, grid, single).mean() for one in grid])
@@ -230,7 +230,7 @@ def _choice_people(base: float, effect: float) -> tuple[float, float, float]:
     factor = float(brentq(lambda one: misses(median, one, base + effect), 0.1, 3.0))
     reference = median * ability[:, None]
     effects = _choice_share(reference * factor * change) - _choice_share(reference)
-    low, high = BOUNDS[CHOICE]
+    low, high = BOUNDS[CHOICE_KIND]
     return median, factor, float(((effects < low) | (effects > high)).mean())
 
 
@@ -245,12 +245,12 @@ class _Choices:
     lapses: float = 0.0
 
     def __call__(self, rng: np.random.Generator, shape: Shape) -> DrawnStudies:
-        trials = TEXTURES * CHOICE_REPEATS
-        cells = (*shape, TEXTURES, 2, CHOICE_REPEATS)
+        trials = N_TEXTURES * CHOICE_REPEATS
+        cells = (*shape, N_TEXTURES, 2, CHOICE_REPEATS)
         orders = np.empty(cells)
         for model in (0, 1):
             positions = shuffled(rng, (*shape, trials)) / (trials - 1)
-            orders[..., model, :] = positions.reshape(*shape, TEXTURES, CHOICE_REPEATS)
+            orders[..., model, :] = positions.reshape(*shape, N_TEXTURES, CHOICE_REPEATS)
         days = counterbalanced(cells)
         d_prime = self._abilities(rng, shape)
         shares = _choice_share(d_prime)
@@ -285,21 +285,21 @@ def _strongest(rng: np.random.Generator, d_prime: Floats) -> NDArray[np.bool_]:
     right = np.empty(d_prime.shape, dtype=bool)
     for texture, similar in enumerate(SIMILARITY):
         felt = d_prime[:, :, texture, ..., None]
-        evidence = felt * similar + rng.standard_normal((*felt.shape[:-1], TEXTURES))
+        evidence = felt * similar + rng.standard_normal((*felt.shape[:-1], N_TEXTURES))
         right[:, :, texture] = evidence.argmax(axis=-1) == texture
     return right
 
 
 def _odd(line: str, oddity: _Oddity) -> Situation:
-    return Situation(ODDITY, line, oddity)
+    return Situation(ODDITY_KIND, line, oddity)
 
 
 def _chosen(line: str, choices: _Choices) -> Situation:
-    return Situation(CHOICE, line, choices)
+    return Situation(CHOICE_KIND, line, choices)
 
 
 _PLAIN, _LITTLE = OBVIOUS - CHANCE_OF_THREE, SLIGHT - CHANCE_OF_THREE
-_ODD_BOUND, _LOST = BOUNDS[ODDITY][1], BOUNDS[CHOICE][0]
+_ODD_BOUND, _LOST = BOUNDS[ODDITY_KIND][1], BOUNDS[CHOICE_KIND][0]
 
 ODDITY_SITUATIONS: Mapping[str, Situation] = {
     "nobody feels it": _odd("everybody at chance", _Oddity(0.0)),

@@ -15,13 +15,13 @@ from modeling.arrays import Floats
 
 Shape = tuple[int, int]  # studies, people
 
-RATINGS, CHOICE, ODDITY = "ratings", "choice", "oddity"
+RATING_KIND, CHOICE_KIND, ODDITY_KIND = "ratings", "choice", "oddity"
 BOUNDS: Mapping[str, tuple[float, float]] = {
-    RATINGS: (-7.5, 7.5),  # points
-    CHOICE: (-0.1, 0.1),  # shares of right answers
-    ODDITY: (-0.1, 0.1),
+    RATING_KIND: (-7.5, 7.5),  # points
+    CHOICE_KIND: (-0.1, 0.1),  # shares of right answers
+    ODDITY_KIND: (-0.1, 0.1),
 }
-TEXTURES = 7
+N_TEXTURES = 7
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Situation:
     Attributes
     ----------
     kind : str
-        `RATINGS`, `CHOICE` or `ODDITY`.
+        `RATING_KIND`, `CHOICE_KIND` or `ODDITY_KIND`.
     line : str
         What is planted.
     draw : callable

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from benches.validation.people.drawn import (
     BOUNDS,
-    CHOICE,
-    ODDITY,
-    RATINGS,
-    TEXTURES,
+    CHOICE_KIND,
+    N_TEXTURES,
+    ODDITY_KIND,
+    RATING_KIND,
     DrawnStudies,
     Shape,
     Situation,
@@ -36,7 +36,7 @@ Integers = NDArray[np.intp]
 LEVEL, ANCHOR = 60.0, 25.0  # mean sensation of the textures, and of the two anchors
 PERSON_SD, TEXTURE_SD, CELL_SD, NOISE_SD = 7.0, 7.0, 4.0, 8.0
 ANCHORS = 2
-LOW, HIGH = BOUNDS[RATINGS]
+LOW, HIGH = BOUNDS[RATING_KIND]
 
 GAIN_SPREAD = 0.35  # SD of the logarithm of people's gains
 FELT_SPREAD = 0.3  # SD of people's effects in sensation, as a share of the mean
@@ -75,8 +75,8 @@ def _sensations(rng: np.random.Generator, shape: Shape, repeats: int) -> Floats:
     """Sensations (k, n, 7, 2, R) without effects: people, textures and people × textures."""
     k, n = shape
     level = LEVEL + rng.normal(0, PERSON_SD, (k, n, 1)) + rng.normal(0, TEXTURE_SD, (k, 1, 7))
-    level = level + rng.normal(0, CELL_SD, (k, n, TEXTURES))
-    return np.array(np.broadcast_to(level[..., None, None], (k, n, TEXTURES, 2, repeats)))
+    level = level + rng.normal(0, CELL_SD, (k, n, N_TEXTURES))
+    return np.array(np.broadcast_to(level[..., None, None], (k, n, N_TEXTURES, 2, repeats)))
 
 
 def _with_anchors(rng: np.random.Generator, cells: Floats) -> Floats:
@@ -90,7 +90,7 @@ def _rated(
     ratings: Floats, positions: Integers, effects: Floats, *, truth: tuple[float, float]
 ) -> DrawnStudies:
     """Latent ratings (k, n, trials), the anchors last, as a batch of studies."""
-    cells = (*effects.shape, TEXTURES, 2, (ratings.shape[-1] - ANCHORS) // (2 * TEXTURES))
+    cells = (*effects.shape, N_TEXTURES, 2, (ratings.shape[-1] - ANCHORS) // (2 * N_TEXTURES))
     kept, orders = on_slider(ratings), positions / (positions.shape[-1] - 1)
     return DrawnStudies(
         values=kept[..., :-ANCHORS].reshape(cells),
@@ -148,7 +148,7 @@ def _gained_outside() -> float:
 
 
 def _adaptation(rng: np.random.Generator, shape: Shape) -> DrawnStudies:
-    trials = 2 * TEXTURES + ANCHORS
+    trials = 2 * N_TEXTURES + ANCHORS
     gain = np.exp(rng.normal(-(GAIN_SPREAD**2) / 2, GAIN_SPREAD, shape))
     assimilation = rng.uniform(0, ASSIMILATION, shape)
     effects = LOW * gain * rng.normal(1, FELT_SPREAD, shape)
@@ -181,9 +181,9 @@ def _stops(rng: np.random.Generator, shape: Shape) -> Floats:
 
 def _giving_up(rng: np.random.Generator, shape: Shape) -> DrawnStudies:
     """Two groups of people; noise is skewed, and a slider stays where attention left it."""
-    trials = 2 * TEXTURES * REPEATS + ANCHORS
+    trials = 2 * N_TEXTURES * REPEATS + ANCHORS
     effects = rng.normal(np.where(rng.random(shape) < 0.5, LITTLE, MUCH), GROUP_SD)
-    by_texture = rng.normal(0, EFFECT_TEXTURE_SD, (shape[0], 1, TEXTURES))
+    by_texture = rng.normal(0, EFFECT_TEXTURE_SD, (shape[0], 1, N_TEXTURES))
     by_texture -= by_texture.mean(axis=-1, keepdims=True)
     felt = _sensations(rng, shape, REPEATS)
     felt[..., 1, :] += (effects[..., None] + by_texture)[..., None]
@@ -250,7 +250,7 @@ def _strategies(rng: np.random.Generator, shape: Shape) -> DrawnStudies:
 
     The share right beyond chance is detection · (2/3 − share of such trials / 3).
     """
-    own, cells = TEXTURES * ODDITY_REPEATS, (*shape, TEXTURES, 1, ODDITY_REPEATS)
+    own, cells = N_TEXTURES * ODDITY_REPEATS, (*shape, N_TEXTURES, 1, ODDITY_REPEATS)
     effects = MOST_EXCESS * rng.beta(*EXCESS_SHAPE, shape)
     first_share = MOST_FIRST * rng.beta(1, 2, shape)
     positions = shuffled(rng, (*shape, own + CATCHES))[..., :own]
@@ -267,7 +267,7 @@ def _strategies(rng: np.random.Generator, shape: Shape) -> DrawnStudies:
         orders=(positions / (own + CATCHES - 1)).reshape(cells),
         effects=np.where(careless, nan, effects),
         mean=MOST_EXCESS * EXCESS_SHAPE[0] / sum(EXCESS_SHAPE),
-        outside=_beta_above(EXCESS_SHAPE, BOUNDS[ODDITY][1] / MOST_EXCESS),
+        outside=_beta_above(EXCESS_SHAPE, BOUNDS[ODDITY_KIND][1] / MOST_EXCESS),
     )
 
 
@@ -277,7 +277,7 @@ def _strategies(rng: np.random.Generator, shape: Shape) -> DrawnStudies:
 def confusions() -> Floats:
     """Shares (7, 7) of wrong answers by texture (row): mostly within its cluster."""
     same = CLUSTERS[:, None] == CLUSTERS
-    within = same & ~np.eye(TEXTURES, dtype=bool)
+    within = same & ~np.eye(N_TEXTURES, dtype=bool)
     shares = WITHIN * within / within.sum(axis=1, keepdims=True)
     return np.asarray(shares + (1 - WITHIN) * ~same / (~same).sum(axis=1, keepdims=True))
 
@@ -301,11 +301,11 @@ def _day(
     rng: np.random.Generator, right: Floats, perseveration: Floats
 ) -> tuple[NDArray[np.bool_], Floats]:
     """Right answers and positions (k, n, 7, R) with one model; `right`: share identified (k, n)."""
-    positions = shuffled(rng, (*right.shape, TEXTURES * CHOICE_REPEATS))
+    positions = shuffled(rng, (*right.shape, N_TEXTURES * CHOICE_REPEATS))
     shown = np.argsort(positions, axis=-1) // CHOICE_REPEATS
     identified = right[..., None] + EASE[shown]
     answers = _answered(rng, shown, identified, perseveration=perseveration)
-    cells = (*right.shape, TEXTURES, CHOICE_REPEATS)
+    cells = (*right.shape, N_TEXTURES, CHOICE_REPEATS)
     given = np.take_along_axis(answers == shown, positions, axis=-1)
     return given.reshape(cells), (positions / (positions.shape[-1] - 1)).reshape(cells)
 
@@ -315,12 +315,12 @@ def _perseveration(rng: np.random.Generator, shape: Shape) -> DrawnStudies:
 
     The share right is hence (1 − perseveration) · identified + perseveration / 7, exactly.
     """
-    cells = (*shape, TEXTURES, 2, CHOICE_REPEATS)
+    cells = (*shape, N_TEXTURES, 2, CHOICE_REPEATS)
     effects = -MOST_LOSS * rng.beta(*LOSS_SHAPE, shape)
     perseveration = rng.uniform(0, MOST_PERSEVERATION, shape)
     identified = rng.uniform(0.5, 0.8, shape)
     careless = rng.random(shape) < CARELESS
-    names = rng.dirichlet([1.0] * TEXTURES, shape)  # what the careless answer, whatever is shown
+    names = rng.dirichlet([1.0] * N_TEXTURES, shape)  # what the careless answer, whatever is shown
     values = rng.random(cells) < names[..., None, None]
     days, orders = counterbalanced(cells), np.empty(cells)
     for model in (0, 1):
@@ -335,28 +335,28 @@ def _perseveration(rng: np.random.Generator, shape: Shape) -> DrawnStudies:
         orders=orders,
         effects=np.where(careless, nan, effects),
         mean=-MOST_LOSS * LOSS_SHAPE[0] / sum(LOSS_SHAPE),
-        outside=_beta_above(LOSS_SHAPE, -BOUNDS[CHOICE][0] / MOST_LOSS),
+        outside=_beta_above(LOSS_SHAPE, -BOUNDS[CHOICE_KIND][0] / MOST_LOSS),
     )
 
 
 HELD_OUT: Mapping[str, Situation] = {
     "ratings: adaptation": Situation(
-        RATINGS,
+        RATING_KIND,
         "at the lower bound; gains differ, ratings follow the trials before, noise grows",
         _adaptation,
     ),
     "ratings: giving up": Situation(
-        RATINGS,
+        RATING_KIND,
         "at the bound in two groups; a tenth never attend, two fifths of the others stop",
         _giving_up,
     ),
     "oddity: strategies": Situation(
-        ODDITY,
+        ODDITY_KIND,
         "at the bound; detection or guess, comparison with the first interval, waves of attention",
         _strategies,
     ),
     "choice: perseveration": Situation(
-        CHOICE,
+        CHOICE_KIND,
         "at the bound; answers repeat those before, confusions lie within clusters",
         _perseveration,
     ),

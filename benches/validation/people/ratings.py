@@ -15,8 +15,8 @@ import numpy as np
 
 from benches.validation.people.drawn import (
     BOUNDS,
-    RATINGS,
-    TEXTURES,
+    N_TEXTURES,
+    RATING_KIND,
     DrawnStudies,
     Shape,
     Situation,
@@ -33,7 +33,7 @@ TREND, TREND_SD = 1.0, 2.0  # points from the first to the last trial, and SD be
 ANCHORS, ANCHOR, ANCHOR_SD = 2, 20.0, 6.0  # how many, mean latent rating, SD between people
 PLACE_SD = 5.0  # of ratings at a favourite place
 STEP = 0.01  # of the slider
-AT_BOUND = BOUNDS[RATINGS][1]
+AT_BOUND = BOUNDS[RATING_KIND][1]
 ONE_IN_FIVE, LAPSES = 0.2, 0.1  # shares of people, and of trials
 
 
@@ -47,7 +47,7 @@ class Effects:
 
 
 def _normal(mean: float, sd: float) -> Effects:
-    low, high = BOUNDS[RATINGS]
+    low, high = BOUNDS[RATING_KIND]
     outside = float(not low <= mean <= high)
     if sd > 0:
         people = NormalDist(mean, sd)
@@ -57,7 +57,7 @@ def _normal(mean: float, sd: float) -> Effects:
 
 def _some(share: float, effect: float, *, others: float = 0.0) -> Effects:
     """An effect of a share of people, and another of all others; which ones is by chance."""
-    low, high = BOUNDS[RATINGS]
+    low, high = BOUNDS[RATING_KIND]
     outside = sum(
         part for part, one in ((share, effect), (1 - share, others)) if not low <= one <= high
     )
@@ -69,7 +69,7 @@ def _some(share: float, effect: float, *, others: float = 0.0) -> Effects:
 
 def _skewed(mean: float, sd: float) -> Effects:
     """Exponential effects, whose upper share outside is exp(−distance); for mean − SD > low."""
-    outside = exp(-((BOUNDS[RATINGS][1] - mean) / sd + 1))
+    outside = exp(-((BOUNDS[RATING_KIND][1] - mean) / sd + 1))
     return Effects(lambda rng, shape: mean + sd * (rng.exponential(1.0, shape) - 1), mean, outside)
 
 
@@ -80,7 +80,7 @@ def _heavy_tails(mean: float, sd: float) -> Effects:
         ratio = (bound - mean) / sd  # t / √3
         return 0.5 + (ratio / (1 + ratio**2) + atan(ratio)) / pi
 
-    low, high = BOUNDS[RATINGS]
+    low, high = BOUNDS[RATING_KIND]
     return Effects(
         lambda rng, shape: mean + sd / sqrt(3) * rng.standard_t(3, shape),
         mean,
@@ -101,7 +101,7 @@ class _Ratings:
     anchors: int = ANCHORS
 
     def __call__(self, rng: np.random.Generator, shape: Shape) -> DrawnStudies:
-        trials = 2 * TEXTURES + self.anchors
+        trials = 2 * N_TEXTURES + self.anchors
         effects = self.effects.draw(rng, shape)
         orders = shuffled(rng, (*shape, trials)) / (trials - 1)
         ratings = self._felt(rng, effects) + _trends_and_noise(rng, orders)
@@ -110,13 +110,13 @@ class _Ratings:
         lapsed = rng.random(ratings.shape) < self.lapses
         ratings[lapsed] = rng.uniform(0, 100, ratings.shape)[lapsed]
         kept = on_slider(_heaped(rng, ratings) if self.heaping else ratings)
-        cells = (*shape, TEXTURES, 2, 1)
+        cells = (*shape, N_TEXTURES, 2, 1)
         nobody = self.careless >= 1
         return DrawnStudies(
-            values=kept[..., : 2 * TEXTURES].reshape(cells),
-            checks=kept[..., 2 * TEXTURES :],
+            values=kept[..., : 2 * N_TEXTURES].reshape(cells),
+            checks=kept[..., 2 * N_TEXTURES :],
             days=np.zeros(cells, dtype=np.intp),
-            orders=orders[..., : 2 * TEXTURES].reshape(cells),
+            orders=orders[..., : 2 * N_TEXTURES].reshape(cells),
             effects=np.where(careless, nan, effects),
             mean=nan if nobody else self.effects.mean,
             outside=nan if nobody else self.effects.outside,
@@ -126,8 +126,8 @@ class _Ratings:
         """Latent ratings (k, n, 14 + anchors): textures by models, then anchors."""
         k, n = effects.shape
         person = rng.normal(0, PERSON_SD, (k, n, 1))
-        level = self.base + person + rng.normal(0, TEXTURE_SD, (k, 1, TEXTURES))
-        level = level + rng.normal(0, CELL_SD, (k, n, TEXTURES))
+        level = self.base + person + rng.normal(0, TEXTURE_SD, (k, 1, N_TEXTURES))
+        level = level + rng.normal(0, CELL_SD, (k, n, N_TEXTURES))
         pairs = level[..., None] + effects[..., None, None] * np.array([0.0, 1.0])
         anchors = ANCHOR + person / 2 + rng.normal(0, ANCHOR_SD, (k, n, self.anchors))
         return np.concatenate([pairs.reshape(k, n, -1), anchors], axis=-1)
@@ -154,7 +154,7 @@ def _heaped(rng: np.random.Generator, ratings: Floats) -> Floats:
 
 
 def _rated(line: str, ratings: _Ratings) -> Situation:
-    return Situation(RATINGS, line, ratings)
+    return Situation(RATING_KIND, line, ratings)
 
 
 _NORMAL = _normal(AT_BOUND, EFFECT_SD)

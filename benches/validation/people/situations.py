@@ -3,7 +3,7 @@
 How large is the mean effect of those who attend, and which share of them has an effect outside
 the bounds? The mechanisms are those of ratings and choices (sliders with ends, the triangular
 decision, evidence for seven textures), not the assumptions of a procedure under test.
-`validation_people_held_out` has more, by other mechanisms.
+`held_out` has more, by other mechanisms.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from collections.abc import Mapping
 
 from benches.validation.people.choices import CHOICE_SITUATIONS, ODDITY_SITUATIONS
 from benches.validation.people.drawn import (
-    CHOICE,
-    ODDITY,
-    RATINGS,
+    CHOICE_KIND,
+    ODDITY_KIND,
+    RATING_KIND,
     DrawnStudies,
     Situation,
 )
 from benches.validation.people.ratings import RATING_SITUATIONS
 
-__all__ = ["CHOICE", "ODDITY", "RATINGS", "SITUATIONS", "DrawnStudies", "Situation"]
+__all__ = ["CHOICE_KIND", "ODDITY_KIND", "RATING_KIND", "SITUATIONS", "DrawnStudies", "Situation"]
 
 # By "kind: name"; each is called with a generator and (studies, people).
 SITUATIONS: Mapping[str, Situation] = {

@@ -11,12 +11,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.answers.hand import MEASURES, load_hand
+from analysis.answers.hand import HAND_MEASURES, load_hand
 from analysis.answers.loading import load_responses
 from experiments.observers.whole_study import simulate_study
-from experiments.sessions.bids_events import COLUMNS as EVENT_COLUMNS
+from experiments.sessions.bids_events import EVENT_COLUMNS
 from experiments.sessions.bids_physio import (
-    COLUMNS,
+    PHYSIO_COLUMNS,
     RATE_HZ,
     at_regular_times,
     physio_bytes,
@@ -68,7 +68,11 @@ def store(tmp_path: Path) -> Callable[..., Path]:
         hand = pd.concat(parts).assign(force_assumed=int(assumed))
         path = beh / f"{stem}_recording-start{run}_physio.tsv.gz"
         path.write_bytes(physio_bytes(at_regular_times(hand)))
-        told = {"SamplingFrequency": RATE_HZ, "Columns": names(COLUMNS), **sidecar(COLUMNS)}
+        told = {
+            "SamplingFrequency": RATE_HZ,
+            "Columns": names(PHYSIO_COLUMNS),
+            **sidecar(PHYSIO_COLUMNS),
+        }
         path.with_name(path.name.replace(".tsv.gz", ".json")).write_bytes(json_bytes(told))
         shown = [
             {"trial_type": "presented", "run": run, "trial": s[0], "surface": s[1]} for s in strokes
@@ -142,7 +146,7 @@ def test_repeats_of_a_cell_count_the_same(store, tmp_path):
     answers = answers_of((1, 2, "oak", "full"), (1, 3, "oak", "full"))
     (row,) = load_hand(tmp_path, {"absolute": answers}).to_dict("records")
     assert row["trials"] == 2
-    assert [row[name] for name in MEASURES] == pytest.approx([150.0, 1.5, 5.0, 1.0])
+    assert [row[name] for name in HAND_MEASURES] == pytest.approx([150.0, 1.5, 5.0, 1.0])
 
 
 @pytest.mark.parametrize(("both_models", "rows"), [(False, 1), (True, 0)])
@@ -164,8 +168,8 @@ def test_a_session_without_a_hand_has_rows_without_values(store, tmp_path):
     other = answers_of((1, 2, "oak", "full"), person="sub-02")
     both = pd.concat([answers_of((1, 2, "oak", "full")), other])
     found = load_hand(tmp_path, {"absolute": both}).set_index("participant_id")
-    assert found.loc["sub-01", list(MEASURES)].notna().all()
-    assert found.loc["sub-02", list(MEASURES)].isna().all()
+    assert found.loc["sub-01", list(HAND_MEASURES)].notna().all()
+    assert found.loc["sub-02", list(HAND_MEASURES)].isna().all()
     assert found.loc["sub-02", "trials"] == 1
 
 

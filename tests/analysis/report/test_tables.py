@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 import analysis.page.page
-from analysis.answers.hand import HAND_COLUMNS
+from analysis.answers.hand import HAND_TABLE_COLUMNS
 from analysis.answers.responses import Responses
 from analysis.chapters.chapter import Stream
 from analysis.chapters.choices import section as choices_chapter
@@ -24,7 +24,7 @@ from analysis.chapters.confusions.buttons import BUTTON_COLUMNS
 from analysis.chapters.confusions.section import (
     BIAS_COLUMNS,
     CHANGE_COLUMNS,
-    FIT_COLUMNS,
+    CHOICE_FIT_COLUMNS,
     INFORMATION_COLUMNS,
     SIMILARITY_COLUMNS,
 )
@@ -41,9 +41,9 @@ from analysis.chapters.single_answers.section import (
     CLAIM_MIXED_COLUMNS,
     mixed_section,
 )
-from analysis.chapters.speed.comparison import COMPARISON_COLUMNS as SPEED_COLUMNS
 from analysis.chapters.speed.comparison import RIGHT_WRONG_COLUMNS, TIME_RATIO_COLUMNS
-from analysis.chapters.speed.scores import CELL_COLUMNS, CONDITIONAL_COLUMNS, SCORE_COLUMNS
+from analysis.chapters.speed.comparison import SPEED_COMPARISON_COLUMNS as SPEED_COLUMNS
+from analysis.chapters.speed.scores import CONDITIONAL_COLUMNS, SCORE_COLUMNS, TEXTURE_TIME_COLUMNS
 from analysis.chapters.speed.section import speed_accuracy_section
 from analysis.columns import TEXTURE
 from analysis.labels import ALL_TEXTURES
@@ -69,8 +69,7 @@ from analysis.textures.regressions import (
     SUPPORT_COLUMNS,
     driving_table,
 )
-from analysis.textures.results import FIT_COLUMNS as MODEL_FIT_COLUMNS
-from analysis.textures.results import VERDICT_COLUMNS as LAYER_VERDICT_COLUMNS
+from analysis.textures.results import LAYER_VERDICT_COLUMNS, MODEL_FIT_COLUMNS
 from benches.atlas import hands
 from benches.atlas.edges import examine
 from benches.atlas.section import stability_section
@@ -78,10 +77,9 @@ from benches.atlas.tables import EDGE_COLUMNS, MARGIN_COLUMNS
 from benches.chart.chart import chart_of
 from benches.chart.judging import judge
 from benches.chart.page import chart_section
-from benches.chart.summary import COMPARISON_COLUMNS, METHOD_COLUMNS
+from benches.chart.summary import METHOD_COLUMNS, RIVAL_COMPARISON_COLUMNS
 from benches.chart.surfaces import Simulated, simulated_sources
-from benches.scenes.examples import COMPARISON_COLUMNS as SCENE_COMPARISON_COLUMNS
-from benches.scenes.examples import CompiledExample, Surface
+from benches.scenes.examples import SCENE_COMPARISON_COLUMNS, CompiledExample, Surface
 from benches.scenes.section import (
     SCENE_STEP_COLUMNS,
     SCENE_TEXTURE_COLUMNS,
@@ -107,13 +105,13 @@ DECLARED = {
     "agreement": AGREEMENT_COLUMNS,
     "raters": RATER_COLUMNS,
     "careless": CARELESS_COLUMNS,
-    "hand": HAND_COLUMNS,
+    "hand": HAND_TABLE_COLUMNS,
     "hand_tests": HAND_TEST_COLUMNS,
     "correct_rates": CORRECT_RATE_COLUMNS,
     "confusion": CONFUSION_COLUMNS,
     "confusion_change": CHANGE_COLUMNS,
     "transferred_information": INFORMATION_COLUMNS,
-    "similarity_fit": FIT_COLUMNS,
+    "similarity_fit": CHOICE_FIT_COLUMNS,
     "similarities": SIMILARITY_COLUMNS,
     "biases": BIAS_COLUMNS,
     "buttons": BUTTON_COLUMNS,
@@ -124,7 +122,7 @@ DECLARED = {
     "time_ratio": TIME_RATIO_COLUMNS,
     "speed_right_and_wrong": RIGHT_WRONG_COLUMNS,
     "speed_scores": SCORE_COLUMNS,
-    "speed_cells": CELL_COLUMNS,
+    "speed_cells": TEXTURE_TIME_COLUMNS,
     "speed_quantiles": CONDITIONAL_COLUMNS,
     "gfc": GFC_COLUMNS,
     "fits": MODEL_FIT_COLUMNS,
@@ -141,7 +139,7 @@ DECLARED = {
     "planted_layers": PLANTED_LAYER_COLUMNS,
     "planted_between": PLANTED_BETWEEN_COLUMNS,
     "provenance": PROVENANCE_COLUMNS,
-    "chart_comparisons": COMPARISON_COLUMNS,
+    "chart_comparisons": RIVAL_COMPARISON_COLUMNS,
     "chart_methods": METHOD_COLUMNS,
     "scene_comparison": SCENE_COMPARISON_COLUMNS,
     "scene_steps": SCENE_STEP_COLUMNS,

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.optimize import minimize
 
-from analysis.statistics.design import MODEL, ORDER, SESSION, complete_participants, design
+from analysis.statistics.design import MODEL_EFFECT, ORDER, SESSION, complete_participants, design
 from analysis.statistics.mixed import (
     MIXED_COLUMNS,
     MIXED_MODEL,
@@ -148,7 +148,7 @@ def test_where_intercepts_and_slopes_are_perfectly_correlated_the_maximum_is_fou
     best = minimize(lambda at: fitted(at)[0], np.log([11.0, 5.0, 5.0]), method="Nelder-Mead")
     row = model_row(answers)
     assert row["method"] == MIXED_MODEL
-    place = built.terms[MODEL]
+    place = built.terms[MODEL_EFFECT]
     assert_allclose(row["se"], np.sqrt(fitted(best.x)[1][place, place]), rtol=2e-3)
     spreads = row[["intercept_sd", "slope_sd", "residual_sd"]].astype(float)
     assert_allclose(spreads, np.exp(best.x), rtol=5e-3)
@@ -157,13 +157,13 @@ def test_where_intercepts_and_slopes_are_perfectly_correlated_the_maximum_is_fou
 def test_effects_of_session_and_order_are_taken_into_account():
     answers = planted(5.0, people=24, session=8.0, order=20.0, mirrored=True)
     table = mixed_effects(answers, "rating", models=MODELS, rng=rng()).set_index("term")
-    assert list(table.index) == [MODEL, SESSION, ORDER]
-    for term, truth in ((MODEL, 5.0), (SESSION, 8.0), (ORDER, 20.0)):
+    assert list(table.index) == [MODEL_EFFECT, SESSION, ORDER]
+    for term, truth in ((MODEL_EFFECT, 5.0), (SESSION, 8.0), (ORDER, 20.0)):
         estimate, se = table.loc[term, ["estimate", "se"]]
         assert abs(estimate - truth) < 3.5 * se, term
     assert table["p"].notna().tolist() == [True, False, False]
-    assert table.loc[MODEL, "slope_sd"] == pytest.approx(6.0, rel=0.5)
-    assert table.loc[MODEL, "residual_sd"] == pytest.approx(5.0, rel=0.1)
+    assert table.loc[MODEL_EFFECT, "slope_sd"] == pytest.approx(6.0, rel=0.5)
+    assert table.loc[MODEL_EFFECT, "residual_sd"] == pytest.approx(5.0, rel=0.1)
 
 
 def test_missing_answers_weigh_neither_textures_nor_models():
@@ -230,7 +230,7 @@ def test_the_predictor_weighs_every_texture_once():
         built.values,
         rcond=None,
     )[0]
-    assert found[built.terms[MODEL]] == pytest.approx(-4.0)
+    assert found[built.terms[MODEL_EFFECT]] == pytest.approx(-4.0)
     assert set(np.unique(built.model)) == {-0.5, 0.5}
     assert built.textures == 3
 
@@ -247,7 +247,7 @@ def test_covariates_that_do_not_vary_are_no_columns():
     answers = planted().drop(columns="session").groupby(["participant_id", "texture"]).head(1)
     answers = pd.concat([answers, answers.assign(model="simplified")]).drop_duplicates()
     single = answers.groupby("participant_id").head(1)
-    assert design(single, "rating", models=MODELS).terms == {MODEL: 0}
+    assert design(single, "rating", models=MODELS).terms == {MODEL_EFFECT: 0}
     assert SESSION not in design(answers, "rating", models=MODELS).terms
 
 

@@ -39,10 +39,10 @@ from benches.rendering.figure import (
 from benches.rendering.rivals import (
     AR,
     COMPILED,
-    DIRECT,
-    FORMS,
+    DIRECT_FORM_I,
     KERNEL,
     RATE_HZ,
+    RIVAL_FORMS,
     TRANSPOSED,
     layered_texture,
     operations,
@@ -63,7 +63,7 @@ def planted() -> RenderingBench:
 
     Twice as much live.
     """
-    ns = {KERNEL: 3.0, DIRECT: 2.5, TRANSPOSED: 1.5, "TPT": 2.7, AR: 18.0}
+    ns = {KERNEL: 3.0, DIRECT_FORM_I: 2.5, TRANSPOSED: 1.5, "TPT": 2.7, AR: 18.0}
     rows = [
         (called, name, m, update, factor * ns[name] * (1 if name == AR else m))
         for (called, factor), name, m, update in product(
@@ -127,7 +127,7 @@ def test_tables_and_aims_cover_every_combination(bench: RenderingBench) -> None:
     )
     assert np.isfinite(blocks.to_numpy()).all()
     counts = bench.aims["what"].value_counts()
-    for name, called in product(FORMS, (ONE_CALL, LIVE)):
+    for name, called in product(RIVAL_FORMS, (ONE_CALL, LIVE)):
         assert counts[f"kernel / {name}, {called}"] == len(LAYERS) * len(UPDATES)
     assert not counts.index.str.contains("AR").any()  # its coefficients are made at each update
     assert counts["sosfilt / Renderer"] == len(LAYERS) * len(BLOCKS)

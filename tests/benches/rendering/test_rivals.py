@@ -12,11 +12,11 @@ from benches.rendering.coefficients import tabled_predictor
 from benches.rendering.rivals import (
     AR,
     COMPILED,
-    DIRECT,
-    FORMS,
+    DIRECT_FORM_I,
     KERNEL,
     ORDER,
     RATE_HZ,
+    RIVAL_FORMS,
     TPT,
     TRANSPOSED,
     CompiledStream,
@@ -69,7 +69,7 @@ def test_all_layered_filters_agree_while_the_hand_is_held(
     expected = Renderer(texture, seed=3, update_samples=update).render(*hand)
     assert np.array_equal(stream(KERNEL, texture, update).render(*hand), expected)
     scale = expected.std()
-    for name in (*FORMS, TPT):
+    for name in (*RIVAL_FORMS, TPT):
         found = stream(name, texture, update).render(*hand)
         assert np.abs(found - expected).max() <= 1e-9 * scale
     noise = white_noise(KEY, 0, SAMPLES)
@@ -140,7 +140,7 @@ def cookbook(texture: TextureModel, update: int) -> list[float]:
 
 @pytest.mark.parametrize("update", [1, 5, 32])
 @pytest.mark.parametrize(
-    ("name", "textbook"), [(TPT, simper), (DIRECT, cookbook), (TRANSPOSED, transposed)]
+    ("name", "textbook"), [(TPT, simper), (DIRECT_FORM_I, cookbook), (TRANSPOSED, transposed)]
 )
 def test_layered_rivals_follow_a_moving_hand_as_in_the_textbook(
     name: str, textbook, update: int

@@ -13,14 +13,20 @@ from scipy import stats
 from benches.validation.people import held_out
 from benches.validation.people.choices import strongest_shares, triangular_share
 from benches.validation.people.held_out import HELD_OUT
-from benches.validation.people.situations import CHOICE, ODDITY, RATINGS, SITUATIONS, DrawnStudies
+from benches.validation.people.situations import (
+    CHOICE_KIND,
+    ODDITY_KIND,
+    RATING_KIND,
+    SITUATIONS,
+    DrawnStudies,
+)
 from modeling.arrays import Floats
 
 ALL = {**SITUATIONS, **{f"{name} (held out)": one for name, one in HELD_OUT.items()}}
 STUDIES, PEOPLE = 100, 50
 ERRORS = 4.0  # standard errors within which a mean is recovered
 NOBODY = [name for name in SITUATIONS if name.startswith("ratings: everybody")]
-WITH_RATINGS = [name for name, one in SITUATIONS.items() if one.kind == RATINGS]
+WITH_RATINGS = [name for name, one in SITUATIONS.items() if one.kind == RATING_KIND]
 
 # Mean of the simple difference of those who attend, where no end of a scale hides any of it.
 LAPSED = 0.9
@@ -81,7 +87,7 @@ def attending(name: str) -> np.ndarray:
 def simple_effects(name: str) -> Floats:
     """Other − reference, or share right − 1/3, of each person; (k, n)."""
     means = drawn(name).values.mean(axis=(2, 4))
-    return means[..., 0] - 1 / 3 if ALL[name].kind == ODDITY else means[..., 1] - means[..., 0]
+    return means[..., 0] - 1 / 3 if ALL[name].kind == ODDITY_KIND else means[..., 1] - means[..., 0]
 
 
 def within_errors(sample: Floats, expected: float) -> bool:
@@ -97,34 +103,34 @@ def share_is(hits: np.ndarray, expected: float) -> bool:
 @pytest.mark.parametrize("name", ALL)
 def test_batches_have_the_layout_of_their_kind(name: str):
     batch, kind = drawn(name), ALL[name].kind
-    models = 1 if kind == ODDITY else 2
+    models = 1 if kind == ODDITY_KIND else 2
     cells = batch.values.shape
     assert cells[:4] == (STUDIES, PEOPLE, 7, models)
     assert batch.days.shape == batch.orders.shape == cells
     assert batch.checks.shape[:2] == batch.effects.shape == (STUDIES, PEOPLE)
-    no_checks = kind == CHOICE or name.endswith("no anchors")
-    assert batch.checks.shape[2] == (0 if no_checks else {RATINGS: 2, ODDITY: 6}[kind])
+    no_checks = kind == CHOICE_KIND or name.endswith("no anchors")
+    assert batch.checks.shape[2] == (0 if no_checks else {RATING_KIND: 2, ODDITY_KIND: 6}[kind])
     for answers in (batch.values, batch.checks):
         assert np.isfinite(answers).all()
-        if kind == RATINGS:
+        if kind == RATING_KIND:
             assert ((answers >= 0) & (answers <= 100)).all()
             assert np.allclose(answers * 100, np.round(answers * 100), atol=1e-6)
         else:
             assert np.isin(answers, (0.0, 1.0)).all()
-    assert ALL[name].bounds == ((-7.5, 7.5) if kind == RATINGS else (-0.1, 0.1))
+    assert ALL[name].bounds == ((-7.5, 7.5) if kind == RATING_KIND else (-0.1, 0.1))
 
 
 @pytest.mark.parametrize("name", ALL)
 def test_each_trial_has_a_place_of_its_own_in_its_session(name: str):
     batch = drawn(name)
-    sessions = 2 if ALL[name].kind == CHOICE else 1
+    sessions = 2 if ALL[name].kind == CHOICE_KIND else 1
     answers = batch.values[0, 0].size + batch.checks.shape[2]
     last = answers // sessions - 1
     places = np.sort((batch.days + batch.orders / 2).reshape(STUDIES, PEOPLE, -1), axis=-1)
     assert (np.diff(places, axis=-1) >= 0.5 / last - 1e-9).all()
     assert (batch.orders.min(), batch.orders.max()) == (0.0, 1.0)
     assert within_errors(batch.orders[..., -1, -1, -1], 0.5)
-    if ALL[name].kind == CHOICE:
+    if ALL[name].kind == CHOICE_KIND:
         first = batch.days[0, :, 0, 0, 0]
         assert (batch.days == batch.days[:1, :, :1, :, :1]).all()
         assert (batch.days[..., 1, :] == 1 - batch.days[..., 0, :]).all()
@@ -165,10 +171,10 @@ def test_every_mean_lies_where_the_name_says():
         kind, situation = name.split(": ")
         assert kind == one.kind
         if any(situation.startswith(start) for start in [*at_bound, "heavy"]):
-            bound = 7.5 if kind == RATINGS else 0.1
+            bound = 7.5 if kind == RATING_KIND else 0.1
             assert abs(drawn(name).mean) == pytest.approx(bound, abs=1e-12), name
     for name in HELD_OUT:
-        bound = 7.5 if name.startswith(RATINGS) else 0.1
+        bound = 7.5 if name.startswith(RATING_KIND) else 0.1
         assert abs(drawn(f"{name} (held out)").mean) == pytest.approx(bound, abs=1e-12)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from experiments.console import screens
-from experiments.console.drawing import BLUE, ORANGE
+from experiments.console.drawing import BLUE, CONSOLE_ORANGE
 from experiments.console.languages import Texts, languages
 from experiments.study.study import Study
 from modeling import InputError
@@ -114,7 +114,7 @@ def test_on_no_page_is_anything_cut_or_covered(display: str) -> None:
         if page["page"] in UNFOCUSED:
             assert Texts.load(page["screen"][:2]).of("keys") in told, where
         if page["page"] in ("consent", "known"):  # neither answer looks like one that was given
-            assert not {BLUE, ORANGE} & set(page["fills"]), where
+            assert not {BLUE, CONSOLE_ORANGE} & set(page["fills"]), where
         # Between two pixels thin strokes fade.
         off = [abs(value - round(value)) for place in page["places"] for value in place]
         assert max(off) < 1e-6, where

@@ -11,7 +11,7 @@ import pytest
 from scipy import stats
 
 from experiments.observers.percepts import Perception, distance, sensation_levels
-from experiments.observers.psychometrics import SCALES, Psychometrics, Trait, choice_shares
+from experiments.observers.psychometrics import RATED_SCALES, Psychometrics, Trait, choice_shares
 from experiments.observers.simulated import SimulatedParticipant, require_plantable
 from experiments.sessions.surfaces import Intake, Surfaces
 from experiments.study.models import ModelSets
@@ -352,7 +352,7 @@ def test_the_odd_one_is_found_as_often_as_the_shared_definition_says(
 ) -> None:
     """Without preferences and lapses, within 3 standard errors of 4000 trials."""
     apart = float(np.hypot(*perception.felt().between[:, 0, 1, 1]))
-    planted = {} if d_prime else {"MDF": dict.fromkeys(SCALES, 0.0)}
+    planted = {} if d_prime else {"MDF": dict.fromkeys(RATED_SCALES, 0.0)}
     temperature_db = apart / d_prime if d_prime else 1.0
     population = replace(EXACT, temperature_db=temperature_db, planted=planted)
     person, one = somebody(perception, population), surfaces(3)
@@ -487,7 +487,7 @@ def test_people_differ_in_planted_effects_as_much_as_they_were_told_to(
         full, other = (person.judgements(absolute(m)) for m in ("full", "simplified"))
         right = [person.shares(relative(m))[2] for m in ("full", "simplified")]
         found.append([*np.subtract(other, full), 100 * (right[1] - right[0])])
-        for scale in SCALES:
+        for scale in RATED_SCALES:
             assert person.own_effect("PVC", scale) == person.own_effect("MDF", scale)
     error = 4.0 / np.sqrt(len(found))
     np.testing.assert_allclose(np.mean(found, axis=0), list(effects.values()), atol=4 * error)
@@ -497,7 +497,9 @@ def test_people_differ_in_planted_effects_as_much_as_they_were_told_to(
     two = [somebody(perception, population, subject) for subject in (1, 2)]
     distances = [person.odd_distance_db(oddity()) for person in two]
     wanted = [
-        np.hypot(*(population.as_distance_db(person.own_effect("MDF", scale)) for scale in SCALES))
+        np.hypot(
+            *(population.as_distance_db(person.own_effect("MDF", scale)) for scale in RATED_SCALES)
+        )
         for person in two
     ]
     np.testing.assert_allclose(distances, wanted)
@@ -509,7 +511,7 @@ def test_nobody_feels_a_difference_between_equal_models(
 ) -> None:
     sets = {"full": truths, "simplified": {**models.sets["simplified"], "PVC": truths["PVC"]}}
     perception = Perception(study, real=truths, models=ModelSets(sets=sets), threshold=threshold)
-    zero = dict.fromkeys((*SCALES, "choice"), 0.0)
+    zero = dict.fromkeys((*RATED_SCALES, "choice"), 0.0)
     person = somebody(perception, replace(EXACT, effect_sd=9.0, planted={"PVC": zero, "MDF": zero}))
     assert person.own_effect("PVC", "choice") == person.odd_distance_db(oddity(texture="PVC")) == 0
     assert person.own_effect("MDF", "choice") != 0

@@ -8,7 +8,7 @@ import pytest
 
 from experiments.tasks.threshold_posterior import Answer, Estimate, answers_of, estimate
 from experiments.tasks.threshold_table import (
-    COLUMNS,
+    THRESHOLD_TABLE_COLUMNS,
     mean_thresholds,
     read_answers,
     threshold_text,
@@ -102,7 +102,7 @@ def test_the_table_is_a_threshold_with_source_and_caveat(tmp_path: Path) -> None
     assert read.acceleration_g == pytest.approx([0.1, 0.01, 10**0.7], rel=1e-5)
     assert "1 person (simulated): two-interval forced choice" in read.source
     assert read.caveat.endswith("at 630 Hz only a bound (see note)")
-    rows = read_table(path, COLUMNS)
+    rows = read_table(path, THRESHOLD_TABLE_COLUMNS)
     assert [row["note"] and row["note"][:5] for row in rows] == [None, None, "above"]
     assert [row["low_g"] is None for row in rows] == [False, False, True]
     assert float(rows[0]["high_g"]) == pytest.approx(0.1 * 10 ** (1.959964 * 1.5 / 20), rel=1e-5)

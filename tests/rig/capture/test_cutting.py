@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from modeling import InputError
 from rig.capture.cutting import (
-    SHORTEST_S,
+    SHORTEST_PART_S,
     StrokeCutter,
     cut_strokes,
     is_clipped,
@@ -88,7 +88,7 @@ def test_pieces_never_overlap_never_leave_their_cell_and_do_not_depend_on_blocks
     for piece in pieces:
         places = np.rint(piece.samples_g).astype(int)
         assert np.array_equal(places, np.arange(places[0], places[-1] + 1))
-        assert round(SHORTEST_S * RATE_HZ) <= places.size <= round(longest_s * RATE_HZ)
+        assert round(SHORTEST_PART_S * RATE_HZ) <= places.size <= round(longest_s * RATE_HZ)
         used[places] += 1
         at = places / RATE_HZ
         assert piece.start_s == pytest.approx(at[0])

@@ -20,7 +20,7 @@ from modeling.files.tables import write_table
 from rig.hand.following import Follower
 from rig.hand.reader import HandReader
 from rig.hand.sample import Sample
-from rig.hand.scripted import COLUMNS
+from rig.hand.scripted import SCRIPT_COLUMNS
 from rig.hand.settings import HandSettings
 from rig.hand.window import PointerDevice
 from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, SIMULATED, Live, now_s
@@ -207,7 +207,9 @@ def test_started_again_without_its_device_it_waits_for_it_and_is_watched(
 ) -> None:
     table = tmp_path / "hand.tsv"
     rows = [(0.0, 0.0, 0.0, 1.0), (1000.0, 150_000.0, 0.0, 1.0)]
-    write_table(table, COLUMNS, [dict(zip(names(COLUMNS), row, strict=True)) for row in rows])
+    write_table(
+        table, SCRIPT_COLUMNS, [dict(zip(names(SCRIPT_COLUMNS), row, strict=True)) for row in rows]
+    )
     with HandReader(live, HandSettings(kind="scripted", script=str(table))) as reader:
         wait_until(lambda: moves(live))
         table.rename(tmp_path / "away.tsv")

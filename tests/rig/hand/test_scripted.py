@@ -10,7 +10,14 @@ import pytest
 from modeling import InputError
 from modeling.files.columns import names
 from modeling.files.tables import write_table
-from rig.hand.scripted import COLUMNS, ScriptedHand, ScriptedTrajectory, Steady, Strokes, script_of
+from rig.hand.scripted import (
+    SCRIPT_COLUMNS,
+    ScriptedHand,
+    ScriptedTrajectory,
+    Steady,
+    Strokes,
+    script_of,
+)
 from rig.hand.settings import HandSettings
 from tests.refusals import refused
 
@@ -33,7 +40,9 @@ def test_a_steady_hand_moves_on() -> None:
 def test_a_table_is_played_once_and_lifted(tmp_path: Path) -> None:
     path = tmp_path / "hand.tsv"
     rows = [(10.0, 0.0, 1.0, 1.0), (10.5, 50.0, 2.0, 3.0)]
-    write_table(path, COLUMNS, [dict(zip(names(COLUMNS), row, strict=True)) for row in rows])
+    write_table(
+        path, SCRIPT_COLUMNS, [dict(zip(names(SCRIPT_COLUMNS), row, strict=True)) for row in rows]
+    )
     script = script_of(HandSettings(kind="scripted", script=str(path)))
     assert script.at(0.0) == (0.0, 1.0, 1.0)
     assert script.at(0.25) == (25.0, 1.5, 2.0)

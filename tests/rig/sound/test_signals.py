@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from modeling import InputError, TextureModel, Threshold, simplify
 from modeling.errors import shown
-from modeling.files.stimulus_table import COLUMNS
+from modeling.files.stimulus_table import STIMULUS_COLUMNS
 from modeling.files.tables import read_table
 from modeling.rendering.limits import Limits
 from modeling.rendering.plan import RenderPlan, plan_for
@@ -171,7 +171,7 @@ def test_a_stimulus_without_its_source_was_made_from_nothing_known(
 
 
 def row_of(folder: Path) -> dict[str, Any]:
-    (row,) = read_table(folder / "manifest.tsv", COLUMNS)
+    (row,) = read_table(folder / "manifest.tsv", STIMULUS_COLUMNS)
     return row
 
 

@@ -20,7 +20,7 @@ import pytest
 import soundfile
 
 from modeling import InputError, TextureModel, Threshold, fit_ar, regressed
-from modeling.files.stimulus_table import COLUMNS
+from modeling.files.stimulus_table import STIMULUS_COLUMNS
 from modeling.perception.sensation_level import sensation_level
 from stimuli.planted.textures import planted_texture, record_texture
 from stimuli.sets import writing
@@ -104,9 +104,9 @@ def test_every_column_is_described(tmp_path: Path, recipe: MakeRecipe) -> None:
     assert (
         list(described)
         == list(manifest(tmp_path / "set")[0])
-        == [column.name for column in COLUMNS]
+        == [column.name for column in STIMULUS_COLUMNS]
     )
-    assert list(StimulusRow.__dataclass_fields__) == [column.name for column in COLUMNS]
+    assert list(StimulusRow.__dataclass_fields__) == [column.name for column in STIMULUS_COLUMNS]
 
 
 def test_samples_are_g(tmp_path: Path, recipe: MakeRecipe, truth: TextureModel) -> None:

@@ -7,10 +7,10 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.answers.hand import MEASURES
+from analysis.answers.hand import HAND_MEASURES
 from analysis.chapters.hand.statistics import (
+    HAND_PARTICIPANT_COLUMNS,
     HAND_TEST_COLUMNS,
-    PARTICIPANT_COLUMNS,
     hand_by_participant,
     hand_means,
     hand_tests,
@@ -65,8 +65,8 @@ def test_it_is_the_paired_t_test_of_the_participants_means(rng):
     hand = hand_of(rng)
     tests = hand_tests(hand, models=PAIR, rng=rng)
     assert list(tests) == names(HAND_TEST_COLUMNS)
-    assert tests["measure"].tolist() == list(MEASURES)
-    for measure in MEASURES:
+    assert tests["measure"].tolist() == list(HAND_MEASURES)
+    for measure in HAND_MEASURES:
         means = hand.pivot_table(index="participant_id", columns="model", values=measure)
         expected = stats.ttest_rel(means["other"], means["full"])
         found = tests.set_index("measure").loc[measure]
@@ -90,9 +90,9 @@ def test_a_texture_counts_only_where_it_has_both_models(rng):
 def test_each_participant_has_a_row_with_every_measure(rng):
     means = hand_means(hand_of(rng), models=PAIR)
     wide = hand_by_participant(means)
-    assert list(wide) == names(PARTICIPANT_COLUMNS)
+    assert list(wide) == names(HAND_PARTICIPANT_COLUMNS)
     assert len(wide) == 12
-    for measure in MEASURES:
+    for measure in HAND_MEASURES:
         own = means[means["measure"] == measure].sort_values("participant_id")
         for which in ("reference", "other"):
             assert wide[f"{measure}_{which}"].tolist() == own[which].tolist()

@@ -19,7 +19,7 @@ from analysis.chapters.oddity.section import (
     oddity_sensitivity,
     sections,
 )
-from analysis.labels import ALL_TEXTURES, TASKS
+from analysis.labels import ALL_TEXTURES, TASK_TITLES
 from analysis.page.page import Table, table_html
 from analysis.statistics.caveats import WITHHELD, Caveats
 from analysis.statistics.claims import Values, claim_tests
@@ -136,7 +136,7 @@ def test_another_task_of_this_kind_has_its_own_section(odd, monkeypatch):
     """Which task it is about follows from what is declared, not from the name."""
     table = replace(ANSWER_TABLES["oddity"], title="triangle test")
     monkeypatch.setitem(ANSWER_TABLES, "triangle", table)
-    monkeypatch.setitem(TASKS, "triangle", table.title)
+    monkeypatch.setitem(TASK_TITLES, "triangle", table.title)
     one = odd({"canvas": 1.0})
     one = replace(one, claim=replace(one.claim, task="triangle"))
     asked = replace(answers(), answers={"triangle": answers().answers["oddity"]})

@@ -13,19 +13,19 @@ from numpy.testing import assert_allclose
 from scipy import stats
 
 from analysis.chapters.speed.comparison import (
-    COMPARISON_COLUMNS,
-    MEASURES,
     RIGHT_WRONG_COLUMNS,
+    SPEED_COMPARISON_COLUMNS,
+    SPEED_MEASURES,
     TIME_RATIO_COLUMNS,
     compare_models,
     right_and_wrong,
     time_ratios,
 )
 from analysis.chapters.speed.scores import (
-    CELL_COLUMNS,
     CONDITIONAL_COLUMNS,
     MEAN_COLUMNS,
     SCORE_COLUMNS,
+    TEXTURE_TIME_COLUMNS,
     conditional_accuracy,
     lisas,
     participant_scores,
@@ -85,7 +85,7 @@ SMALL = table(
 
 def test_cells_have_medians_and_shares():
     cells = speed_and_accuracy(SMALL, models=MODELS)
-    assert list(cells) == names(CELL_COLUMNS)
+    assert list(cells) == names(TEXTURE_TIME_COLUMNS)
     expected = [
         ["sub-1", "a", "full", 3, 3.0, 2 / 3, 4.5, 3.0],
         ["sub-1", "a", "simplified", 1, 2.0, 1.0, 2.0, np.nan],
@@ -204,8 +204,8 @@ def test_quantiles_differ_by_one_answer_at_most(trials, bins):
 def test_comparison_is_the_paired_test_of_log_times_and_shares():
     answers = planted(ratio=0.8, change=-0.1)
     found = compare_models(answers, models=MODELS, rng=rng())
-    assert list(found) == names(COMPARISON_COLUMNS)
-    assert found["measure"].tolist() == list(MEASURES)
+    assert list(found) == names(SPEED_COMPARISON_COLUMNS)
+    assert found["measure"].tolist() == list(SPEED_MEASURES)
     logs = answers.assign(response_time_s=np.log(answers["response_time_s"]))
     means = logs.pivot_table(
         index="participant_id", columns="model", values=["response_time_s", "correct"]

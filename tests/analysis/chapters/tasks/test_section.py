@@ -21,7 +21,7 @@ from analysis.chapters.claims.plan_sentences import methods_paragraph
 from analysis.chapters.oddity import section as oddity_chapter
 from analysis.chapters.ratings import section as ratings_chapter
 from analysis.chapters.tasks import section as tasks_chapter
-from analysis.labels import ALL_TEXTURES, TASKS
+from analysis.labels import ALL_TEXTURES, TASK_TITLES
 from analysis.page.sections import Section
 from analysis.report.report import write_report
 from analysis.statistics.compared_answers import chance_of
@@ -62,7 +62,7 @@ def declare(monkeypatch: pytest.MonkeyPatch) -> Declare:
     def declare(*own: AnswerColumn, **said: float | bool) -> None:
         table = answer_table(*own, title="pair comparison", texture="", model="", **said)
         monkeypatch.setitem(ANSWER_TABLES, "pair", table)
-        monkeypatch.setitem(TASKS, "pair", table.title)
+        monkeypatch.setitem(TASK_TITLES, "pair", table.title)
 
     return declare
 
