@@ -141,7 +141,7 @@ class Fault:
     """
 
     time_s: float
-    told: str
+    sentence: str
     invalidates: bool
 
 

@@ -52,7 +52,7 @@ class Finding:
     """
 
     name: str
-    told: str
+    sentence: str
     state: State = "ok"
 
 
@@ -63,8 +63,8 @@ def versions() -> list[Finding]:
     found.append(_tried("PortAudio", lambda: portaudio().get_portaudio_version()[1].split(",")[0]))
     rendering = Finding("rendering kernel", "compiled")
     if not is_compiled():
-        told = "expected the compiled kernel, got none; install a C compiler, then tactileq."
-        rendering = Finding("rendering kernel", told, "fault")
+        sentence = "expected the compiled kernel, got none; install a C compiler, then tactileq."
+        rendering = Finding("rendering kernel", sentence, "fault")
     return [*found, rendering, _tried("audio callback", lambda: str(compiled() and "compiled"))]
 
 
@@ -84,8 +84,8 @@ def connected_sound() -> list[Finding]:
     except InputError as error:
         return [Finding("sound", str(error), "fault")]
     if not devices:
-        told = "expected a sound device, got none; connect one, or start the sound server."
-        return [Finding("sound", told, "fault")]
+        sentence = "expected a sound device, got none; connect one, or start the sound server."
+        return [Finding("sound", sentence, "fault")]
     return [Finding(device.name, _described(device)) for device in devices]
 
 
@@ -97,8 +97,10 @@ def connected_input() -> list[Finding]:
 def of_rig(file: Path, *, today: datetime.date) -> tuple[RigFile | None, list[Finding]]:
     """The rig file, and what of it is there: sound, hand, accelerometer, calibration, latency."""
     if not file.exists():
-        told = f"expected a rig file, got none; copy {SHIPPED_RIG_FILE} and adapt it to your rig."
-        return None, [Finding(str(file), told, "fault")]
+        sentence = (
+            f"expected a rig file, got none; copy {SHIPPED_RIG_FILE} and adapt it to your rig."
+        )
+        return None, [Finding(str(file), sentence, "fault")]
     try:
         rig = RigFile.load(file)
     except InputError as error:
@@ -114,14 +116,16 @@ def of_rig(file: Path, *, today: datetime.date) -> tuple[RigFile | None, list[Fi
     ]
     assumed = rig.assumed()
     if assumed:
-        told = f"{len(assumed)} of {counted(len(rig.figures()), 'figure')} are assumed, see below"
-        found.append(Finding("figures", told, "note"))
+        sentence = (
+            f"{len(assumed)} of {counted(len(rig.figures()), 'figure')} are assumed, see below"
+        )
+        found.append(Finding("figures", sentence, "note"))
     return rig, found
 
 
 def remedies(findings: Iterable[Finding]) -> list[str]:
     """One line each for a shell, to install what is missing on Debian and its like."""
-    faults = " ".join(finding.told for finding in findings if finding.state == "fault")
+    faults = " ".join(finding.sentence for finding in findings if finding.state == "fault")
     packages = [name for name in ("libportaudio2", "jackd2") if name in faults]
     lines = [f"sudo apt-get install {' '.join(packages)}"] if packages else []
     groups = [group for group in ("input", "dialout") if f"group {group}" in faults]
@@ -142,11 +146,11 @@ def _described(device: SoundDevice) -> str:
 
 
 def _input_device(device: ConnectedDevice) -> Finding:
-    told = f"{device.name}, {device.kind}"
+    sentence = f"{device.name}, {device.kind}"
     if device.readable:
-        return Finding(device.path, told)
+        return Finding(device.path, sentence)
     needed = GROUPS.get(device.kind, "input")
-    return Finding(device.path, f"{told}: not readable; it needs the group {needed}", "note")
+    return Finding(device.path, f"{sentence}: not readable; it needs the group {needed}", "note")
 
 
 def _sound(rig: RigFile) -> Finding:
@@ -181,11 +185,11 @@ def _limits(rig: RigFile) -> Finding:
 
 def _hand(rig: RigFile) -> Finding:
     hand = rig.hand
-    told = f"{hand.kind}{f', {hand.device}' if hand.device else ''}"
+    sentence = f"{hand.kind}{f', {hand.device}' if hand.device else ''}"
     if hand.kind in ("scripted", "window"):
-        return Finding("hand", told)
+        return Finding("hand", sentence)
     if hand.device is not None and hand.device.startswith("/"):
-        return _present("hand", Path(hand.device), told, group=GROUPS[hand.kind])
+        return _present("hand", Path(hand.device), sentence, group=GROUPS[hand.kind])
     wanted = [
         device
         for device in connected_devices()
@@ -193,27 +197,27 @@ def _hand(rig: RigFile) -> Finding:
         and (hand.device in (None, device.path) or str(hand.device) in device.name)
     ]
     if not wanted:
-        return Finding("hand", f"expected a {told}, got none; connect it.", "fault")
+        return Finding("hand", f"expected a {sentence}, got none; connect it.", "fault")
     if not any(device.readable for device in wanted):
         unread = _input_device(wanted[0])
-        return Finding("hand", f"{unread.name} is {unread.told}.", "fault")
-    return Finding("hand", told)
+        return Finding("hand", f"{unread.name} is {unread.sentence}.", "fault")
+    return Finding("hand", sentence)
 
 
-def _present(what: str, file: Path, told: str, *, group: str) -> Finding:
+def _present(what: str, file: Path, sentence: str, *, group: str) -> Finding:
     if not file.exists():
         return Finding(what, f"expected {file}, got no such device; connect it.", "fault")
     if not os.access(file, os.R_OK):
-        told = f"expected to read {file}, got no permission; join the group {group}."
-        return Finding(what, told, "fault")
-    return Finding(what, told)
+        sentence = f"expected to read {file}, got no permission; join the group {group}."
+        return Finding(what, sentence, "fault")
+    return Finding(what, sentence)
 
 
 def _accelerometer(rig: RigFile) -> Finding:
     section = rig.accelerometer
     if section is None:
-        told = "none under [accelerometer]: the rig cannot be calibrated"
-        return Finding("accelerometer", told, "note")
+        sentence = "none under [accelerometer]: the rig cannot be calibrated"
+        return Finding("accelerometer", sentence, "note")
     return _card(
         "accelerometer",
         section.device,
@@ -226,15 +230,15 @@ def _accelerometer(rig: RigFile) -> Finding:
 def _calibration(rig: RigFile, today: datetime.date) -> Finding:
     done = rig.calibration
     if done is None or rig.vibrator.g_per_volt.assumed:
-        told = "never calibrated: levels are assumed (tactileq rig calibrate level)"
-        return Finding("calibration", told, "note")
+        sentence = "never calibrated: levels are assumed (tactileq rig calibrate level)"
+        return Finding("calibration", sentence, "note")
     now, then = (rig.rig.name, set(rig.rig.serials)), (done.rig, set(done.serials))
     if now != then:
-        told = (
+        sentence = (
             f"expected the calibration of {rig.rig.name}, got that of {done.rig} with the serial "
             f"numbers {', '.join(done.serials) or 'none'}; calibrate this one."
         )
-        return Finding("calibration", told, "fault")
+        return Finding("calibration", sentence, "fault")
     return _aged("calibration", done.date, today)
 
 
@@ -242,11 +246,11 @@ def _latency(rig: RigFile, today: datetime.date) -> Finding:
     done = rig.latency
     if done is None:
         return Finding("latency", "never measured (tactileq rig latency)", "note")
-    told = f"median {done.median_ms.value:.1f} ms, 95 % within {done.p95_ms.value:.1f} ms"
+    sentence = f"median {done.median_ms.value:.1f} ms, 95 % within {done.p95_ms.value:.1f} ms"
     if done.measured_on is None:
-        return Finding("latency", f"{told}, date unknown", "note")
+        return Finding("latency", f"{sentence}, date unknown", "note")
     aged = _aged("latency", done.measured_on, today)
-    return Finding("latency", f"{told}, {aged.told}", aged.state)
+    return Finding("latency", f"{sentence}, {aged.sentence}", aged.state)
 
 
 def _aged(what: str, day: datetime.date, today: datetime.date) -> Finding:

@@ -103,9 +103,9 @@ class SimulatedRig:
         """All is well."""
         return RigHealth()
 
-    def break_down(self, told: str) -> None:
+    def break_down(self, sentence: str) -> None:
         """Let a fault happen that makes the trial invalid."""
-        self._faults.append(Fault(self.now_s(), told, invalidates=True))
+        self._faults.append(Fault(self.now_s(), sentence, invalidates=True))
 
     def take_faults(self) -> tuple[Fault, ...]:
         """What `break_down` was given since the last call."""

@@ -55,9 +55,9 @@ class Terminal:
         """Ask for the sample of a tray."""
         self._ask(f"[bold]Tray {escape(tray)}[/]: put its sample in place")
 
-    def call(self, told: str) -> None:
+    def call(self, sentence: str) -> None:
         """Report what failed, and ask to repair it; the trial will be repeated."""
-        self._ask(f"[bold]The rig failed in this trial.[/] {escape(told)} Repair it")
+        self._ask(f"[bold]The rig failed in this trial.[/] {escape(sentence)} Repair it")
 
     def go_on(self) -> None:
         """Ask for nothing; a stop that was typed in the meantime counts."""

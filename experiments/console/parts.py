@@ -121,7 +121,7 @@ class PageParts:
 
         share = min(max(done / of, 0.0), 1.0) if of else 0.0
         filled = [bar(share * BAR[0], BLUE)] if share > 0 else []
-        told = text(
+        counted_text = text(
             self.window,
             f"{done} / {of}",
             at=(-HALF_WIDTH, FOOT_Y),
@@ -129,7 +129,7 @@ class PageParts:
             color=CONSOLE_GREY,
             anchor="left",
         )
-        return [bar(BAR[0], PALE), *filled, told]
+        return [bar(BAR[0], PALE), *filled, counted_text]
 
     def card(self, y: float, height: float) -> Any:
         """A card as wide as the page, on which widgets stand."""

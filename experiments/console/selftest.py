@@ -98,7 +98,7 @@ def time_presentations(rig: TextureRig, models: Sequence[Presentable]) -> Timing
     finally:
         rig.close()
     if faults:
-        raise InputError(f"expected presentations without a fault, got: {faults[0].told}")
+        raise InputError(f"expected presentations without a fault, got: {faults[0].sentence}")
     return Timing(
         name="presentations",
         meaning="from a press to the first sample",

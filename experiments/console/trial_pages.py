@@ -73,7 +73,7 @@ def choose(runner: PageRunner, task: Task, surfaces: Surfaces) -> Choice:
     numbered = [_numbered(runner, index, surfaces) for index in range(surfaces.count)]
     answers = [_answer(runner, index, surfaces) for index in range(surfaces.count)]
     confirm = runner.proceed(of("choice.confirm"), y=-0.36)
-    told = _ChangingRemark(runner, y=-0.27)
+    remark = _ChangingRemark(runner, y=-0.27)
 
     def update() -> None:
         # What the page announces: the task begins with it.
@@ -88,7 +88,7 @@ def choose(runner: PageRunner, task: Task, surfaces: Surfaces) -> Choice:
             button.enabled = index in surfaces.felt
             button.lit = surfaces.chosen == index
         confirm.enabled = surfaces.chosen is not None and _remaining(surfaces) == 0
-        told.say(_remark(partial(runner.texts.of_task, task.name), surfaces))
+        remark.say(_remark(partial(runner.texts.of_task, task.name), surfaces))
 
     reals = [] if real is None else [real]
     runner.show(
@@ -98,7 +98,7 @@ def choose(runner: PageRunner, task: Task, surfaces: Surfaces) -> Choice:
             runner.title(of(f"{task.name}.question")),
             runner.remark(runner.texts.of_task(task.name, "surface.felt_now"), y=0.225),
             runner.card(0.0, 0.03 + ROW_PITCH * _rows(surfaces.count)),
-            told,
+            remark,
             *runner.foot(of("choice.keys")),
         ),
         surfaces=surfaces,
@@ -137,7 +137,7 @@ def _scale(runner: PageRunner, name: str, surfaces: Surfaces) -> RatingScale:
         ends=(of("absolute.lowest"), of("absolute.highest")),
         at=(0.0, SCALES_Y[name]),
         width=0.95,
-        told=lambda value: surfaces.note("slider", scale=name, value=round(value, 1)),
+        changed=lambda value: surfaces.note("slider", scale=name, value=round(value, 1)),
     )
 
 
@@ -185,13 +185,13 @@ def _remaining(surfaces: Surfaces) -> int:
 def _remark(of: Callable[..., str], surfaces: Surfaces) -> str:
     """What to do next: press a number, choose, feel the rest, or confirm the choice."""
     if surfaces.chosen is not None:
-        told = of("choice.so_far", number=surfaces.chosen + 1)
+        sentence = of("choice.so_far", number=surfaces.chosen + 1)
     else:
         may_confirm = surfaces.felt and _remaining(surfaces) == 0
-        told = of("choice.choose_one" if may_confirm else "choice.press")
+        sentence = of("choice.choose_one" if may_confirm else "choice.press")
     if count := _remaining(surfaces):
-        told += "\n" + of("choice.remaining", count=count)
-    return told
+        sentence += "\n" + of("choice.remaining", count=count)
+    return sentence
 
 
 class _ChangingRemark:

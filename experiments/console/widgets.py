@@ -210,13 +210,13 @@ class RatingScale:
         ends: tuple[str, str],
         at: Point,
         width: float,
-        told: Callable[[float], None],
+        changed: Callable[[float], None],
     ) -> None:
         from psychopy import visual
 
         self.name = name
         self._at, self._width = at, width
-        self._told = told
+        self._changed = changed
         # Read-only: PsychoPy draws it and keeps the rating, this class minds the mouse.
         self._slider = visual.Slider(
             window,
@@ -305,7 +305,7 @@ class RatingScale:
 
     def _rate(self, value: float) -> None:
         self._slider.recordRating(value)
-        self._told(value)
+        self._changed(value)
 
     def _value(self, point: Point) -> float:
         share = (point[0] - self._at[0]) / self._width + 0.5

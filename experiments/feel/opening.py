@@ -62,14 +62,14 @@ def notes_on(rig: RigFile) -> tuple[str, ...]:
     """What a visitor should know of a rig: what is simulated, assumed, or too late."""
     scale = (rig.sound.fullscale_v, rig.vibrator.g_per_volt)
     late = rig.latency is not None and rig.latency.p95_ms.value > HIGHEST_LATENCY_MS
-    told = {
+    notes = {
         "simulated hand": rig.hand.kind == "scripted",
         "simulated sound card": rig.sound.simulated,
         "force assumed": not rig.hand.measures_force,
         "level not calibrated": any(figure.assumed for figure in scale),
         f"later than {HIGHEST_LATENCY_MS:g} ms, which changes textures": late,
     }
-    return tuple(note for note, holds in told.items() if holds)
+    return tuple(note for note, holds in notes.items() if holds)
 
 
 @contextmanager
@@ -90,9 +90,9 @@ def demonstration(vibrator: Vibrator | None = None) -> Iterator[LiveRig]:
     pointer = f"hand: mouse pointer ({PIXELS_PER_MM:g} px/mm, {FORCE_N:g} N assumed)"
     with ExitStack() as opened:
         live = opened.enter_context(Live.create())
-        sound, told = _usual_sound(live, vibrator, opened)
+        sound, sound_note = _usual_sound(live, vibrator, opened)
         hand = opened.enter_context(HandReader(live, settings))
-        yield LiveRig(live, hand, sound, pointed=True, notes=(pointer, told))
+        yield LiveRig(live, hand, sound, pointed=True, notes=(pointer, sound_note))
 
 
 def _usual_sound(

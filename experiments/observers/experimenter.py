@@ -24,9 +24,9 @@ class SimulatedExperimenter:
         """The sample is mounted at once."""
         self.asked.append(tray)
 
-    def call(self, told: str) -> None:
+    def call(self, sentence: str) -> None:
         """What failed is repaired at once."""
-        self.calls.append(told)
+        self.calls.append(sentence)
 
     def go_on(self) -> None:
         """Never wants to stop."""

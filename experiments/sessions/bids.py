@@ -102,17 +102,17 @@ def export_all(data_folder: str | Path) -> Exported:
     held, damaged = held_sessions(root)
     new: list[Path] = []
     changed: list[Path] = []
-    told = [one.told for one in damaged]
+    sentences = [one.sentence for one in damaged]
     for one in filter(_to_be_shown, held):
         made, rows = session_files(one)
-        told += [f"{one.files.stem}: {row}" for row in rows]
+        sentences += [f"{one.files.stem}: {row}" for row in rows]
         _write(made, new=new, changed=changed)
     _write(_people(root, held, damaged=damaged), new=new, changed=changed)
     try:
         _write(_readme(root), new=new, changed=changed)
     except InputError as error:
-        told.append(str(error))
-    return Exported(new=tuple(new), changed=tuple(changed), damaged=tuple(told))
+        sentences.append(str(error))
+    return Exported(new=tuple(new), changed=tuple(changed), damaged=tuple(sentences))
 
 
 def require_tables(
@@ -155,7 +155,7 @@ def require_tables(
     for one in damaged:
         if read(one.files):
             advice = otherwise.format(who=one.files.participant)
-            raise InputError(f"{one.told.removesuffix('.')}, or {advice}.")
+            raise InputError(f"{one.sentence.removesuffix('.')}, or {advice}.")
     ended = (one for one in held if _to_be_shown(one) and read(one.files))
     wrong = [path for one in ended for path in _differing(session_files(one)[0])]
     if task is None and subject is None and any(one.files.answers.is_file() for one in held):

@@ -43,7 +43,7 @@ def session_files(held: StoredSession) -> tuple[Made, tuple[str, ...]]:
     hand, lost_readings = _hand_there(sidecar, sources) or _hand(held, runs)
     made = {**_answers(held), **_events(held, shown), **hand}
     lost = {"presentations": lost_rows, "hand": lost_readings}
-    damaged = {name: list(told) for name, told in lost.items() if told}
+    damaged = {name: list(said) for name, said in lost.items() if said}
     made[sidecar] = json_bytes(
         {
             **_circumstances(held),

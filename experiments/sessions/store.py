@@ -480,7 +480,7 @@ def _check_unchanged(
                 f"expected {name} {getattr(stored, name)}, as {files.stem} began, got "
                 f"{getattr(now, name)}; go on as it began."
             )
-    for what, name, told in (
+    for what, name, key in (
         ("study", "study_sha256", "study"),
         ("models", "models_sha256", "models_sha256"),
     ):
@@ -488,7 +488,7 @@ def _check_unchanged(
             overrides.allow(
                 what,
                 f"expected the {what} that {files.stem} began with, got another "
-                f"{differing(stored.values[told], now.values[told])}; restore what was there",
+                f"{differing(stored.values[key], now.values[key])}; restore what was there",
             )
 
 

@@ -41,7 +41,7 @@ class Damaged:
     """One session whose manifest or log cannot be read, and why, in one sentence."""
 
     files: SessionFiles
-    told: str
+    sentence: str
 
 
 def held_session(files: SessionFiles) -> StoredSession:
@@ -71,7 +71,7 @@ def held_sessions(data_folder: str | Path) -> tuple[list[StoredSession], list[Da
         try:
             held.append(held_session(files))
         except InputError as error:
-            damaged.append(Damaged(files=files, told=str(error)))
+            damaged.append(Damaged(files=files, sentence=str(error)))
     return held, damaged
 
 

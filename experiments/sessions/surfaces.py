@@ -392,7 +392,7 @@ class Experimenter(Protocol):
         """Ask for the sample of a tray."""
         ...
 
-    def call(self, told: str) -> None:
+    def call(self, sentence: str) -> None:
         """Report what failed, and ask to repair it."""
         ...
 

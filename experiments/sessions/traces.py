@@ -179,7 +179,7 @@ def presentation_table(
     for record, until_s in zip(records, next_s, strict=False):
         outside = outside_grid(rows, [record]) or Outside()
         # A fault may be noticed when a presentation has ended.
-        told = [fault.told for fault in faults if record.start_s <= fault.time_s < until_s]
+        sentences = [fault.sentence for fault in faults if record.start_s <= fault.time_s < until_s]
         yield {
             "run": run,
             "trial": trial,
@@ -197,7 +197,7 @@ def presentation_table(
             "peak_g": record.peak_g,
             "misses": record.misses,
             "stale_blocks": record.stale_blocks,
-            "faults": " | ".join(told),
+            "faults": " | ".join(sentences),
         }
 
 

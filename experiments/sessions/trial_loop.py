@@ -219,7 +219,9 @@ class _Running:
         """Take the rig's faults, and log them."""
         faults = self._rig.take_faults()
         for fault in faults:
-            self.note("fault", told=fault.told, time_s=fault.time_s, invalidates=fault.invalidates)
+            self.note(
+                "fault", told=fault.sentence, time_s=fault.time_s, invalidates=fault.invalidates
+            )
         return faults
 
     def _announce(self, phase: str, *, again: bool) -> None:
@@ -291,7 +293,7 @@ class _Running:
         self._durations_s.append(time.monotonic() - began_s)
         self._at = None
         if not valid:
-            self._call(next(fault.told for fault in faults if fault.invalidates))
+            self._call(next(fault.sentence for fault in faults if fault.invalidates))
         return valid
 
     def _ask(self, trial: Trial) -> Mapping[str, object]:
@@ -334,9 +336,9 @@ class _Running:
             problems=self._rig.health().problems,
         )
 
-    def _call(self, told: str) -> None:
+    def _call(self, sentence: str) -> None:
         """Call the experimenter, whom the participant waits for."""
-        self._experimenter.call(told)
+        self._experimenter.call(sentence)
         self._respondent.wait(self._experimenter.ready)
 
     def _row(

@@ -176,8 +176,8 @@ def proof_of_sensitivity(study: Study, claim: ClaimSection) -> str:
     if claim.task == "absolute" and plan.anchors:
         return "No equality unless the anchors are rated lower than the textures' own models."
     if plan.catch_trials:
-        told = catch_trials_text(study, claim.task)
-        return f"No equality unless the odd one of catch trials is found above chance ({told})."
+        sentence = catch_trials_text(study, claim.task)
+        return f"No equality unless the odd one of catch trials is found above chance ({sentence})."
     advice = {"absolute": "; give it anchors", "oddity": "; give it catch trials"}
     return (
         f"No equality in any case, as nothing in it tests sensitivity{advice.get(claim.task, '')}."

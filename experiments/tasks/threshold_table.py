@@ -181,7 +181,9 @@ def _mean(of: Sequence[Estimate]) -> MeanThreshold:
     count = len(of)
     sd_db = of[0].sd_db if count == 1 else float(levels_db.std(ddof=1))
     beyond = [BEYOND[one.beyond] for one in of if one.beyond]
-    notes = [f"{beyond.count(told)} of {count} {told}" for told in dict.fromkeys(beyond)]
+    notes = [
+        f"{beyond.count(sentence)} of {count} {sentence}" for sentence in dict.fromkeys(beyond)
+    ]
     half_db = _factor(count) * sd_db
     mean_db = float(levels_db.mean())
     return MeanThreshold(

@@ -234,8 +234,8 @@ def markdown(columns: Sequence[Column]) -> str:
         numbers = replace(column, unit="").wanted  # which stands beside them
         values = "; ".join(levels) or (numbers if column.limits is not None else "text")
         may_be = [*["n/a"] * (not column.required), *["no column"] * column.optional]
-        told = ", or ".join([values, *may_be])
-        cells = (f"`{column.name}`", column.description, column.unit, told)
+        allowed = ", or ".join([values, *may_be])
+        cells = (f"`{column.name}`", column.description, column.unit, allowed)
         rows.append(tuple(cell.replace("|", "\\|") for cell in cells))
     return "\n".join(f"| {' | '.join(row)} |" for row in rows)
 

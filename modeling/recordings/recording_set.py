@@ -229,7 +229,7 @@ def check_rounding(places: Iterable[tuple[str, float, float]]) -> None:
 def load_usable(
     folder: str | Path, *, texture: str | None = None
 ) -> tuple[RecordingSet, tuple[str, ...]]:
-    """As `RecordingSet.load`, but unusable records are left out, with a sentence for each.
+    """As `RecordingSet.load`, but unusable records are left out, with a stated_cells for each.
 
     Raises
     ------
@@ -340,33 +340,35 @@ def _place(folder: Path, row: Mapping[str, str]) -> str:
 
 
 def _load_row(folder: Path, row: Mapping[str, str]) -> Recording:
-    told = stated(folder, row)
+    stated_cells = stated(folder, row)
     path = listed_file(folder, row["file"], index_name=INDEX_NAME)
-    unit, scale_g = told["unit"] or "arbitrary", told["g_per_fullscale"]
+    unit, scale_g = stated_cells["unit"] or "arbitrary", stated_cells["g_per_fullscale"]
     if path.suffix.lower() == ".wav":
-        samples, rate_hz = read_wav(path, channel=told["channel"])
+        samples, rate_hz = read_wav(path, channel=stated_cells["channel"])
         if scale_g is not None:
             samples, unit = samples * scale_g, "g"
     else:
         samples = _read_samples(path)
-        if (rate_hz := told["rate_hz"]) is None:
+        if (rate_hz := stated_cells["rate_hz"]) is None:
             (column,) = chosen(INDEX_COLUMNS, "rate_hz")
             raise column.refusal("", _place(folder, row))
     try:
         recording = Recording(
             samples,
             rate_hz,
-            told["speed_mm_s"],
-            told["force_n"],
-            told["texture"],
+            stated_cells["speed_mm_s"],
+            stated_cells["force_n"],
+            stated_cells["texture"],
             unit=unit,
-            simulated=told["simulated"] == "true",
-            repeat=told["repeat"] or 1,
-            clipped_share=nan if told["clipped_share"] is None else told["clipped_share"],
+            simulated=stated_cells["simulated"] == "true",
+            repeat=stated_cells["repeat"] or 1,
+            clipped_share=nan
+            if stated_cells["clipped_share"] is None
+            else stated_cells["clipped_share"],
         )
     except InputError as error:
         raise InputError(f"{path.name}: {error}") from None
-    expected = told["samples"]
+    expected = stated_cells["samples"]
     if expected is not None and samples.size != expected:
         raise InputError(
             f"expected {expected} samples in {path.name}, got {samples.size}; the file is "

@@ -54,8 +54,10 @@ PIECE_COLUMNS = (
         for column in chosen(INDEX_COLUMNS, "repeat", "rate_hz", "samples")
     ),
     *(
-        Column(name, unit=unit, description=told, limits=(-inf, inf), nan=True, optional=True)
-        for name, unit, told in (
+        Column(
+            name, unit=unit, description=description, limits=(-inf, inf), nan=True, optional=True
+        )
+        for name, unit, description in (
             ("mean_speed_mm_s", "mm/s", "Mean speed of the hand"),
             ("speed_sd_mm_s", "mm/s", "Standard deviation of its speed"),
             ("mean_force_n", "N", "Mean force"),

@@ -404,11 +404,11 @@ class DeskRig:
         return taken
 
     def _notice(self) -> None:
-        for told in (*self.parts.sound.faults(), *self.parts.reader.faults()):
-            self._fail(told)
+        for sentence in (*self.parts.sound.faults(), *self.parts.reader.faults()):
+            self._fail(sentence)
 
-    def _fail(self, told: str, *, invalidates: bool = True) -> None:
-        self._faults.append(Fault(self.now_s(), told, invalidates=invalidates))
+    def _fail(self, sentence: str, *, invalidates: bool = True) -> None:
+        self._faults.append(Fault(self.now_s(), sentence, invalidates=invalidates))
 
     def take_history(self) -> HandRows:
         """What the hand did since the last call; NaN where nothing measures it."""

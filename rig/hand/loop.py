@@ -131,11 +131,11 @@ class HandLoop:
     def _report_late(self, device: Device, late: int) -> None:
         """Once samples are in time again, report how many were late."""
         if late > self._late:
-            told = (
+            sentence = (
                 f"expected the readings of the {device.name} within {LOST_S:g} s, got "
                 f"{late - self._late} that came later and were dropped; close other programs."
             )
-            self._send(HandFault(told))
+            self._send(HandFault(sentence))
             self._late = late
 
     def _report(self, counts: dict[str, int]) -> None:

@@ -32,7 +32,7 @@ class Ready(Message, frozen=True):
 class HandFault(Message, frozen=True):
     """Something went wrong: one sentence."""
 
-    told: str
+    sentence: str
 
 
 class Counts(Message, frozen=True):

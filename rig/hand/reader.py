@@ -184,8 +184,8 @@ class HandReader:
                 report = HandFault(str(refusal))
             self._alive_s = min(self._alive_s, now_s())
             match report:
-                case HandFault(told):
-                    self._add_fault(told)
+                case HandFault(sentence):
+                    self._add_fault(sentence)
                 case Counts(counts):
                     self._counts = counts
                 case Firmware(version):

@@ -21,8 +21,8 @@ from rig.live.memory import now_s
 RATE_HZ = 1000
 _LARGEST = 1e6  # of any number in a table
 SCRIPT_COLUMNS = tuple(
-    Column(name, unit=unit, description=told, limits=(-_LARGEST, _LARGEST), required=True)
-    for name, unit, told in (
+    Column(name, unit=unit, description=description, limits=(-_LARGEST, _LARGEST), required=True)
+    for name, unit, description in (
         ("time_s", "s", "Rising; the first moment is when the device is opened"),
         ("x_mm", "mm", "Position along x"),
         ("y_mm", "mm", "Position along y"),

@@ -71,7 +71,7 @@ class WindowHand:
         assert settings.counts_per_mm is not None  # which the settings make sure of
         self.pointer = PointerDevice(settings.counts_per_mm)
         self._loop = HandLoop(
-            live, settings, send=lambda told: None, opening=lambda settings: self.pointer
+            live, settings, send=lambda sentence: None, opening=lambda settings: self.pointer
         )
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None

@@ -142,7 +142,7 @@ class Child:
             self.kill(f" ({error})")
             raise ChildLost(f"it was killed ({error})") from None
         if isinstance(message, Refused):
-            raise InputError(message.told)
+            raise InputError(message.sentence)
         return message
 
     def close(self) -> None:

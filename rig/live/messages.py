@@ -28,7 +28,7 @@ class Done(Message, frozen=True):
 class Refused(Message, frozen=True):
     """What was asked for cannot be done: one sentence."""
 
-    told: str
+    sentence: str
 
 
 def send(pipe: IO[bytes], message: object) -> None:

@@ -311,10 +311,10 @@ class SoundOutput:
 
         None of a signal, where nothing was begun, or where its process is gone.
         """
-        told = self._reply(Count(self._presentation), Corrected)
-        if told is None or told.counters is None:
+        corrected = self._reply(Count(self._presentation), Corrected)
+        if corrected is None or corrected.counters is None:
             return None
-        return Counted(presentation=self._presentation, counters=told.counters)
+        return Counted(presentation=self._presentation, counters=corrected.counters)
 
     def masking(self, level: float) -> None:
         """White noise on the masking channel from now on.
@@ -351,8 +351,8 @@ class SoundOutput:
             self._lose("it has ended")
         elif self._child is not None and now_s() - self._last_block_s > STALLED_S:
             self._lose(f"no block for {STALLED_S:g} s, so its server is gone or suspended")
-        told, self._faults = tuple(self._faults), []
-        return told
+        faults, self._faults = tuple(self._faults), []
+        return faults
 
     def _look(self) -> Rows:
         """The blocks since the last look, counted; who looks is there, which is the heartbeat."""

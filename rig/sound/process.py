@@ -144,11 +144,11 @@ class Player:
         self._sources[number] = _Source("surface", source, (texture, arrays, memory))
         self._want(surface=source)
 
-    def _filled(self, structure: str, told: Members) -> tuple[Any, list[Any]]:
+    def _filled(self, structure: str, members: Members) -> tuple[Any, list[Any]]:
         """A structure of the kernel, and the arrays that it only points at."""
         fields = {
             name: np.frombuffer(value) if isinstance(value, bytes) else value
-            for name, value in told.items()
+            for name, value in members.items()
         }
         return filled(self._ffi, structure, fields, real=np.float64)
 

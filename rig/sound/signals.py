@@ -173,7 +173,7 @@ def _sources(folder: Path) -> dict[str, Path]:
 
 
 def _prepared(folder: Path, row: Mapping[str, str], where: str) -> PreparedSignal:
-    told: dict[str, Any] = dict(typed(row, _SIGNAL, where))
+    cells: dict[str, Any] = dict(typed(row, _SIGNAL, where))
     path = folder / row["file"]
     found = hashlib.sha256(read_bytes(path, "the stimulus")).hexdigest()
     if found != row["sha256"]:
@@ -188,13 +188,13 @@ def _prepared(folder: Path, row: Mapping[str, str], where: str) -> PreparedSigna
         )
     samples, rate_hz = read_wav(path)
     if row["format"] == "pcm24":
-        if (full_scale_g := told["full_scale_g"]) is None:
+        if (full_scale_g := cells["full_scale_g"]) is None:
             (column,) = chosen(_SIGNAL, "full_scale_g")
             raise column.refusal("", where)
         samples = samples * full_scale_g
     return PreparedSignal(
         samples_g=samples,
         rate_hz=rate_hz,
-        vibrator_sha256=told["vibrator_sha256"],
+        vibrator_sha256=cells["vibrator_sha256"],
         simulated=row["simulated"] == "true",
     )

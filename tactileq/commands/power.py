@@ -334,7 +334,7 @@ def chances(
     work = partial(simulated_verdicts, people, sizes, seed=seed, effort=effort)
     found: dict[int, list[Verdict]] = {}
     began_s = first_s = monotonic()
-    told = False
+    sentence = False
     with working(work, range(simulations), jobs=jobs, dask=dask) as done:
         for number, one in done:
             found[number] = one
@@ -342,8 +342,8 @@ def chances(
             now_s, count = monotonic(), len(found)
             if count == 1:
                 first_s = now_s  # before it, workers were begun
-            elif not told and count < simulations and now_s - began_s >= FIRST_ANSWER_S:
-                told = True
+            elif not sentence and count < simulations and now_s - began_s >= FIRST_ANSWER_S:
+                sentence = True
                 so_far = (one for each in found.values() for one in each)
                 left_s = (simulations - count) * (now_s - first_s) / (count - 1)
                 first(power_table(so_far, simulations=count), left_s)

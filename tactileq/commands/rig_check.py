@@ -48,7 +48,9 @@ def rig_check(rig: RigPath = Path("rig.toml")) -> None:
     every = [finding for findings in parts.values() for finding in findings]
     faults = [finding for finding in every if finding.state == "fault"]
     for fault in faults:
-        console.print(f"no study can run: {fault.name}: {fault.told}", style="red", markup=False)
+        console.print(
+            f"no study can run: {fault.name}: {fault.sentence}", style="red", markup=False
+        )
     for line in remedies(every):
         console.print(f"    {line}", markup=False, soft_wrap=True)
     if faults:
@@ -71,7 +73,7 @@ def _show(console: Console, title: str, findings: Sequence[Finding]) -> None:
         table.add_row(
             Text(finding.name),
             # Faults are listed below, in full.
-            Text("" if finding.state == "fault" else finding.told, style=style),
+            Text("" if finding.state == "fault" else finding.sentence, style=style),
             Text(_MARKS[finding.state], style=style),
         )
     if not findings:

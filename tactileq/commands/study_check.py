@@ -57,10 +57,10 @@ def _print_claims(plan: Study) -> None:
     from experiments.tasks.page import proof_of_sensitivity
 
     claims = plan.plan.claims
-    told = "none; all findings are exploratory"
+    sentence = "none; all findings are exploratory"
     if claims:
-        told = f'{len(claims)}, rule of verdicts "{plan.plan.rule}"'
-    print(f"claims: {told}")
+        sentence = f'{len(claims)}, rule of verdicts "{plan.plan.rule}"'
+    print(f"claims: {sentence}")
     for claim in claims:
         print(f"  {claim.name}: {proof_of_sensitivity(plan, claim)}")
 

@@ -54,16 +54,16 @@ def faults(findings: dict[str, Finding]) -> set[str]:
 def test_a_calibrated_rig_has_no_fault(tmp_path: Path) -> None:
     findings = found(rig_file(tmp_path).path)
     assert faults(findings) == set()
-    assert findings["calibration"].told.endswith("today")
-    assert "median 12.0 ms, 95 % within 18.0 ms" in findings["latency"].told
+    assert findings["calibration"].sentence.endswith("today")
+    assert "median 12.0 ms, 95 % within 18.0 ms" in findings["latency"].sentence
     assert findings["accelerometer"].state == "note"
-    assert "are assumed" in findings["figures"].told
+    assert "are assumed" in findings["figures"].sentence
 
 
 def test_age_is_told_and_old_calibrations_are_noted(tmp_path: Path) -> None:
     file = rig_file(tmp_path).path
     later = found(file, today=TODAY + datetime.timedelta(days=89))["calibration"]
-    assert (later.told.split(", ")[1], later.state) == ("89 days ago", "ok")
+    assert (later.sentence.split(", ")[1], later.state) == ("89 days ago", "ok")
     old = found(file, today=TODAY + datetime.timedelta(days=91))["calibration"]
     assert old.state == "note"
 
@@ -82,7 +82,7 @@ def test_what_prevents_a_study_is_a_fault(
 ) -> None:
     findings = found(rig_file(tmp_path, (old, new)).path)
     assert faults(findings) == {where}
-    assert told in findings[where].told
+    assert told in findings[where].sentence
 
 
 def test_without_calibration_and_latency_there_are_notes(tmp_path: Path) -> None:
@@ -97,10 +97,10 @@ def test_without_calibration_and_latency_there_are_notes(tmp_path: Path) -> None
 
 def test_a_missing_or_broken_rig_file_is_a_fault(tmp_path: Path) -> None:
     missing = found(tmp_path / "rig.toml")
-    assert "desk_rig.toml" in missing[str(tmp_path / "rig.toml")].told
+    assert "desk_rig.toml" in missing[str(tmp_path / "rig.toml")].sentence
     (tmp_path / "rig.toml").write_text("version = 2\n")
     broken = found(tmp_path / "rig.toml")
-    assert "version" in broken[str(tmp_path / "rig.toml")].told
+    assert "version" in broken[str(tmp_path / "rig.toml")].sentence
     assert faults(missing) == faults(broken) == {str(tmp_path / "rig.toml")}
 
 
@@ -122,7 +122,7 @@ def test_without_psychopy_the_rig_is_checked_all_the_same(monkeypatch: pytest.Mo
     monkeypatch.setattr("modeling.files.provenance.version", none)
     found = {finding.name: finding for finding in versions()}
     assert found["psychopy"].state == "note"
-    check_refusal(found["psychopy"].told, expected="psychopy", got="pip install psychopy")
+    check_refusal(found["psychopy"].sentence, expected="psychopy", got="pip install psychopy")
 
 
 def test_no_card_at_all_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -163,9 +163,9 @@ def test_a_hand_is_found_by_its_kind_and_its_name(
     )
     assert hand_finding(tmp_path, 'kind = "tablet"').state == "ok"
     assert hand_finding(tmp_path, 'kind = "tablet"\ndevice = "Small"').state == "ok"
-    assert "got none" in hand_finding(tmp_path, 'kind = "tablet"\ndevice = "Large"').told
-    assert "got none" in hand_finding(tmp_path, 'kind = "serial"').told
-    told = [(finding.name, finding.told) for finding in connected_input()]
+    assert "got none" in hand_finding(tmp_path, 'kind = "tablet"\ndevice = "Large"').sentence
+    assert "got none" in hand_finding(tmp_path, 'kind = "serial"').sentence
+    told = [(finding.name, finding.sentence) for finding in connected_input()]
     assert told == [
         ("/dev/input/event1", "Some Keyboard, other"),
         ("/dev/input/event2", "Small Tablet Pen, tablet"),

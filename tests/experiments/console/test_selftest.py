@@ -41,7 +41,7 @@ def test_presentations_are_timed_on_the_rigs_clock_and_the_rig_closed(
 
 def test_a_rig_that_fails_meanwhile_is_told(rig: Any, models: ModelSets) -> None:
     rig.faults.append(Fault(0.1, "expected a card, got none; plug it in.", invalidates=True))
-    with refused(InputError, names=["fault", rig.faults[-1].told]):
+    with refused(InputError, names=["fault", rig.faults[-1].sentence]):
         time_presentations(rig, [models.of("PVC", "full")])
     assert not rig.opened
 

@@ -711,7 +711,7 @@ class Keeping(MemoryStore):
 
     def trace(self, trial: int, rows: Any, *, presentations: Any, faults: Any) -> None:
         self.traces.append((trial, rows, presentations))
-        self.faults.append([fault.told for fault in faults])
+        self.faults.append([fault.sentence for fault in faults])
 
 
 def test_the_hands_history_and_the_presentations_of_each_trial_reach_the_store(

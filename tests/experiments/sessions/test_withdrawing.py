@@ -29,7 +29,7 @@ PEOPLE = {"simulated_participant": False, "simulated_rig": False}
 @pytest.fixture
 def root(write_session) -> Path:
     """Two people; the first one's answers to the questions are like nobody else's."""
-    files = write_session(answers={"age": 31, "hours_of_sleep": 6.125}, **PEOPLE)
+    files = write_session(answers={"age": 31, "hours_of_sleep": 6.1258364}, **PEOPLE)
     write_session("relative", answered=3, status=None, **PEOPLE)
     write_session(subject=2, answers={"age": 22, "hours_of_sleep": 7.5}, **PEOPLE)
     export_all(files.root)
@@ -51,9 +51,9 @@ def holding(root: Path, *texts: str) -> list[Path]:
 def test_nothing_remains_of_somebody_who_withdraws(root):
     code = Roster(root).subjects()[1]["code"]
     assert holding(root, code)
-    assert holding(root, "6.125")
+    assert holding(root, "6.1258364")
     withdraw(root, 1)
-    assert holding(root, code, "6.125", "sub-01") == []
+    assert holding(root, code, "6.1258364", "sub-01") == []
     assert files_of(root, 1) == ()
     people = pd.read_csv(root / "participants.tsv", sep="\t")
     assert people["participant_id"].tolist() == ["sub-02"]
@@ -113,7 +113,7 @@ def test_begun_again_it_goes_on_where_it_was_stopped(root, monkeypatch, broken):
         withdraw(root, 1)
     monkeypatch.undo()
     withdraw(root, 1)
-    assert holding(root, "6.125", "sub-01") == []
+    assert holding(root, "6.1258364", "sub-01") == []
     with refused(InputError, expected="subject", got=1):
         withdraw(root, 1)
 
@@ -164,7 +164,7 @@ def test_killed_anywhere_it_is_begun_again_and_the_others_can_go_on_meanwhile(ro
             export_all(data)
         else:
             withdraw(data, 1)
-        assert holding(data, code, "6.125", "sub-01") == []
+        assert holding(data, code, "6.1258364", "sub-01") == []
         assert Roster(data).subjects()[1]["left"] == "withdrawn"
         for path, contents in others.items():
             assert (data / path.relative_to(root)).read_bytes() == contents

@@ -56,5 +56,5 @@ def rig_file(folder: Path, *changes: tuple[str, str]) -> RigFile:
 
 def failures(faults: Iterable[Fault]) -> list[str]:
     """What failed, but for readings that a loaded machine was too slow to take."""
-    told = [fault.told for fault in faults if fault.invalidates]
+    told = [fault.sentence for fault in faults if fault.invalidates]
     return [sentence for sentence in told if "reading of the hand within" not in sentence]

@@ -270,7 +270,7 @@ def test_an_unplugged_hand_is_a_fault_and_its_rows_are_not_available(
         assert (rig.read().speed_mm_s, rig.read().force_n) == (0.0, 0.0)
         assert any("plug" in told for told in rig.health().problems)
         rig.silence()
-        told = [fault.told for fault in rig.take_faults() if fault.invalidates]
+        told = [fault.sentence for fault in rig.take_faults() if fault.invalidates]
         assert any("unplugged" in sentence for sentence in told)
         assert any("reading of the hand" in sentence for sentence in told)
         (record,) = rig.take_presentations()

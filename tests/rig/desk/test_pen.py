@@ -49,7 +49,7 @@ def test_the_pen_feels_what_was_presented(jack_server: Jack, tmp_path: Path) -> 
             (record,) = rig.take_presentations()
             time.sleep(0.3)  # nothing is kept while nothing is presented
             assert sum(piece.samples_g.size for piece in rig.take_acceleration()) < 4800
-            assert not any("accelerometer" in fault.told for fault in rig.take_faults())
+            assert not any("accelerometer" in fault.sentence for fault in rig.take_faults())
     assert pieces
     # A loaded machine loses blocks of the input; what is kept is of the presentation alone.
     measured_s = sum(piece.samples_g.size / piece.rate_hz for piece in pieces)
@@ -123,7 +123,7 @@ def test_a_lost_process_is_told_once_and_the_session_goes_on(
             rig.silence()
             assert rig.take_acceleration() == ()
             (fault,) = [fault for fault in rig.take_faults() if not fault.invalidates]
-            assert "accelerometer" in fault.told
+            assert "accelerometer" in fault.sentence
             rig.present_real("PVC")
             rig.silence()
-            assert not any("accelerometer" in again.told for again in rig.take_faults())
+            assert not any("accelerometer" in again.sentence for again in rig.take_faults())
