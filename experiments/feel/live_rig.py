@@ -13,7 +13,8 @@ from modeling.models.loading import Layered
 from modeling.rendering.plan import RenderCounters
 from rig.hand.reader import HandReader
 from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, OLDEST_READING_S, Live, now_s
-from rig.sound.output import SoundLost, SoundOutput
+from rig.sound.output import SoundOutput
+from rig.sound.supervision import SoundLost
 
 LEVEL_S = 0.25
 MASKING_LEVEL = 0.1  # RMS, share of full scale

@@ -18,7 +18,8 @@ from rig.hand.settings import HandSettings
 from rig.live.memory import Live
 from rig.setup.rig_file import RigFile
 from rig.sound.devices import SoundDevice, find_device
-from rig.sound.output import SoundLost, SoundOutput
+from rig.sound.output import SoundOutput
+from rig.sound.supervision import SoundLost
 
 BLOCK = 256
 PIXELS_PER_MM = 3.78  # of a screen with 96 dots per inch

@@ -13,7 +13,8 @@ from rig.desk.parts import hand_settings, input_settings, sound_output
 from rig.hand.reader import HandReader
 from rig.live.memory import Live
 from rig.setup.rig_file import RigFile
-from rig.sound.output import SoundLost, SoundOutput
+from rig.sound.output import SoundOutput
+from rig.sound.supervision import SoundLost
 
 # With these points a pen's "force" is its pressure, as a share of its range.
 PRESSURE_ITSELF = ((0.0, 0.0), (1.0, 1.0))

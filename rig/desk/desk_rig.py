@@ -40,8 +40,9 @@ from rig.interface import (
 )
 from rig.live.memory import GONE, OLDEST_READING_S, Live, now_s
 from rig.setup.rig_file import RigFile
-from rig.sound.output import Presented, SoundLost, SoundOutput
+from rig.sound.output import Presented, SoundOutput
 from rig.sound.signals import tone_burst
+from rig.sound.supervision import SoundLost
 
 FIRST_READING_S = 5.0
 LOOK_S = 0.1  # interval of checks while waiting for a burst

@@ -121,11 +121,17 @@ class Child:
         return self.hear(kind, within_s=within_s)  # type: ignore[no-any-return]
 
     def send(self, request: Message) -> None:
-        """Send a request; ChildLost if it has ended."""
+        """Send a request; ChildLost if it has ended, or does not take it in time."""
+        # A process that is suspended reads nothing, and a long message fills the pipe: only its
+        # end lets the writer go on.
+        watch = threading.Timer(ANSWER_S, self._process.kill)
+        watch.start()
         try:
             send(self._stdin, request)
         except (OSError, ValueError):
             raise ChildLost(f"it has ended {self.end()}") from None
+        finally:
+            watch.cancel()
 
     def hear(self, kinds: Any, *, within_s: float | None = None) -> Any:
         """Its next message, one of these types (a union or a type); raises what `ask` does."""

@@ -6,12 +6,12 @@ docs/method/live.md#output
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from modeling.arrays import Floats
 from modeling.errors import InputError
@@ -22,42 +22,28 @@ from modeling.rendering.limits import Limits
 from modeling.rendering.noise import stream_key
 from modeling.rendering.plan import RenderCounters, RenderPlan, plan_for, usual_update_s
 from modeling.vibrators.compensation import Compensation
-from rig.live.child import Child, ChildLost, Reply
+from rig.live.child import ChildLost
 from rig.live.memory import (
-    HEARTBEAT_S,
-    NO_HEARTBEAT,
     OLDEST_READING_S,
-    UNDERFLOW,
     Live,
-    Rows,
     now_s,
 )
 from rig.live.messages import Done
 from rig.sound.messages import (
     Corrected,
     Count,
-    Mask,
     Members,
-    Playing,
     PlaySignal,
     PlaySurface,
     Silence,
     SoundSettings,
 )
+from rig.sound.played import STALLED_S, PlayedBlocks
+from rig.sound.signal_limits import check_signal, largest_factor
+from rig.sound.supervision import HALTED, SoundLost, SoundProcess
 
-STALLED_S = 0.5  # without a block: the server is gone
 LOUDEST_MASKING = 0.5
 _MASKING_STREAM = 2**63
-_POLL_S = 0.001
-_HALTED = (
-    f"expected the program to poll the rig at least every {HEARTBEAT_S:g} s, got a longer "
-    "time without; the vibration was stopped, and nothing is felt until something is presented "
-    "again."
-)
-
-
-class SoundLost(OSError):
-    """Nothing can be played, or not to its end; the message is one sentence."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,8 +121,7 @@ class SoundOutput:
         self._live, self._seed = live, seed
         self._limits, self._compensation, self._rate_hz = limits, compensation, rate_hz
         self._has_masking = masking_channel is not None
-        self._masking = 0.0
-        self._settings = SoundSettings(
+        settings = SoundSettings(
             live=str(live.path),
             device=device,
             rate_hz=rate_hz,
@@ -148,16 +133,9 @@ class SoundOutput:
             masking_key=int(stream_key(seed, _MASKING_STREAM)),
         )
         self._block_s = block / rate_hz
-        self._child: Child | None = None
-        self._latency_s = float("nan")
-        self._faults: list[str] = []
+        self._played = PlayedBlocks(live, limits, block_s=self._block_s)
+        self._process = SoundProcess(settings, self._played, block_s=self._block_s)
         self._presentation = 0
-        self._seen = live.blocks_written
-        self._last_block_s = 0.0
-        self._misses = 0
-        self._halted = False
-        # The vibration that has had no pause yet: since when and until when it was felt.
-        self._felt_since_s = self._felt_until_s = 0.0
 
     # --- Open and close ---------------------------------------------------------------------
 
@@ -171,14 +149,11 @@ class SoundOutput:
         SoundLost
             If it cannot be started.
         """
-        if self._child is None:
-            self._start()
+        self._process.start()
 
     def close(self) -> None:
         """Fade to silence and end the process."""
-        if self._child is not None:
-            self._child.close()
-            self._child = None
+        self._process.close()
 
     def __enter__(self) -> SoundOutput:
         self.open()
@@ -190,23 +165,23 @@ class SoundOutput:
     @property
     def pid(self) -> int | None:
         """Number of the process that plays, None where there is none."""
-        return None if self._child is None else self._child.pid
+        return self._process.pid
 
     @property
     def latency_s(self) -> float:
         """Of the output, as PortAudio states it; NaN while it is closed."""
-        return float("nan") if self._child is None else self._latency_s
+        return self._process.latency_s
 
     @property
     def halted(self) -> bool:
         """Whether what was presented last was halted, by what `faults` has seen."""
-        return self._halted
+        return self._played.halted
 
     @property
     def misses(self) -> int:
         """Blocks so far that came too late, according to the driver."""
-        self._look()
-        return self._misses
+        self._process.look()
+        return self._played.misses
 
     # --- What plays -------------------------------------------------------------------------
 
@@ -296,13 +271,12 @@ class SoundOutput:
         Counted or None
             Of what played until now; None where nothing did, or its process is gone.
         """
-        if self._child is None:
+        if self._process.reply(Silence(), Done) is None:
             return None
         try:
-            self._child.ask(Silence(), Done)
-            self._wait(lambda rows: rows["presentation"] == 0)
+            self._process.wait(lambda rows: rows["presentation"] == 0)
         except ChildLost as lost:
-            self._lose(str(lost))
+            self._process.lose(str(lost))
             return None
         return self.counted()
 
@@ -311,7 +285,7 @@ class SoundOutput:
 
         None of a signal, where nothing was begun, or where its process is gone.
         """
-        corrected = self._reply(Count(self._presentation), Corrected)
+        corrected = self._process.reply(Count(self._presentation), Corrected)
         if corrected is None or corrected.counters is None:
             return None
         return Counted(presentation=self._presentation, counters=corrected.counters)
@@ -339,134 +313,37 @@ class SoundOutput:
                 "expected a channel for the masking noise, got none; name masking_channel in the "
                 "rig file."
             )
-        self._masking = level
-        self._reply(Mask(level), Done)  # if it is lost, the next process begins with this level
+        self._process.mask(level)
 
     # --- Health -----------------------------------------------------------------------------
 
     def faults(self) -> tuple[str, ...]:
         """What went wrong since the last call, one sentence each; a heartbeat for what plays."""
-        self._look()
-        if self._child is not None and not self._child.runs:
-            self._lose("it has ended")
-        elif self._child is not None and now_s() - self._last_block_s > STALLED_S:
-            self._lose(f"no block for {STALLED_S:g} s, so its server is gone or suspended")
-        faults, self._faults = tuple(self._faults), []
-        return faults
-
-    def _look(self) -> Rows:
-        """The blocks since the last look, counted; who looks is there, which is the heartbeat."""
-        self._live.heartbeat()
-        self._seen, rows = self._live.blocks_since(self._seen)
-        if rows.size:
-            self._last_block_s = float(rows["time_s"][-1])
-            self._misses += int(np.count_nonzero(rows["flags"] & UNDERFLOW))
-            self._follow_halts((rows["flags"] & NO_HEARTBEAT) > 0)
-            self._follow_vibration(rows)
-        return rows
-
-    def _follow_halts(self, halted: NDArray[np.bool_]) -> None:
-        """Report each halt once; (n,), whether it holds in each block."""
-        before = np.concatenate(([self._halted], halted[:-1]))
-        self._faults += [_HALTED] * int(np.count_nonzero(halted & ~before))
-        self._halted = bool(halted[-1])
-
-    def _follow_vibration(self, rows: Rows) -> None:
-        """Since when, and until when, it was felt without a pause."""
-        felt_s = rows["time_s"][rows["peak_g"] > self._limits.silence]
-        if not felt_s.size:
-            return
-        before_s = np.concatenate(([self._felt_until_s], felt_s[:-1] + self._block_s))
-        pauses = np.flatnonzero(felt_s - before_s >= self._limits.pause_s)
-        if pauses.size:
-            self._felt_since_s = float(felt_s[pauses[-1]])
-        self._felt_until_s = float(felt_s[-1]) + self._block_s
+        return self._process.faults()
 
     def _pause_before(self, seconds: float) -> None:
         """Fall silent for a pause where so much more would be longer than the limit."""
-        self._look()
-        pause_s = self._limits.pause_s + 2 * self._block_s
-        felt_s = self._felt_until_s - self._felt_since_s
-        if felt_s + seconds <= self._limits.duration_s or now_s() > self._felt_until_s + pause_s:
-            return
-        self.silence()
-        time.sleep(max(0.0, self._felt_until_s + pause_s - now_s()))
+        self._process.look()
+        if self._played.pause_needed(seconds):
+            self.silence()
+            time.sleep(max(0.0, self._played.silent_until_s - now_s()))
 
-    def _lose(self, why: str) -> None:
-        self._faults.append(
-            f"expected the sound process to play, got: {why}; nothing is felt until something is "
-            "presented again, by another process."
-        )
-        if self._child is not None:
-            self._child.kill()
-            self._child = None
-
-    # --- The process ------------------------------------------------------------------------
-
-    def _start(self) -> Child:
-        child = Child("rig.sound.process", self._settings)
-        try:
-            self._latency_s = child.ready(Playing).latency_s
-            self._child, self._last_block_s = child, now_s()
-            self._wait(lambda rows: rows["frames"] > 0)
-            if self._masking:
-                child.ask(Mask(self._masking), Done)
-            return child
-        except ChildLost as lost:
-            self.close()
-            raise SoundLost(
-                f"expected a sound process that plays, got: {lost}; check the sound device "
-                "(tactileq rig check)."
-            ) from None
-
-    def _reply(self, request: Count | Mask, kind: type[Reply]) -> Reply | None:
-        """The process' answer; None where there is no process, or it is lost."""
-        try:
-            return None if self._child is None else self._child.ask(request, kind)
-        except ChildLost as lost:
-            self._lose(str(lost))
-            return None
+    # --- What both kinds share --------------------------------------------------------------
 
     def _begin(self, number: int, wanted: PlaySurface | PlaySignal) -> Presented:
-        """Ask for something and wait for its first sample; once more where the process is lost."""
-        for _ in range(2):
-            try:
-                (self._child or self._start()).ask(wanted, Done)
-                row = self._wait(lambda rows: rows["presentation"] == number)
-                return Presented(presentation=number, time_s=float(row["dac_time_s"]))
-            except ChildLost as lost:
-                self._lose(str(lost))
-            except InputError as error:  # of a new process: the device has changed
-                raise SoundLost(str(error)) from None
-        raise SoundLost(
-            "expected a sound process that plays, got two that did not; check the sound device "
-            "(tactileq rig check)."
-        )
-
-    def _wait(self, found: Callable[[Rows], Any], *, within_s: float = STALLED_S + 0.5) -> np.void:
-        """The first new block for which this holds, once its first sample has left."""
-        end_s = now_s() + within_s + 4 * self._block_s
-        while now_s() < end_s:
-            rows = self._look()
-            fitting = rows[np.asarray(found(rows), dtype=bool)]
-            if fitting.size:
-                time.sleep(max(0.0, float(fitting[0]["dac_time_s"]) - now_s()))
-                return fitting[0]  # type: ignore[no-any-return]
-            if self._child is not None and not self._child.runs:
-                raise ChildLost("it has ended")
-            time.sleep(_POLL_S)
-        raise ChildLost("it plays no blocks")
+        row = self._process.begin(wanted, number)
+        return Presented(presentation=number, time_s=float(row["dac_time_s"]))
 
     def _wait_for_end(self, number: int, within_s: float) -> None:
         try:
-            self._wait(lambda rows: rows["presentation"] != number, within_s=within_s)
+            self._process.wait(lambda rows: rows["presentation"] != number, within_s=within_s)
         except ChildLost as lost:
-            self._lose(str(lost))
+            self._process.lose(str(lost))
             raise SoundLost(
                 f"expected a sound process that plays to the end, got: {lost}; play it again."
             ) from None
-        if self._halted:
-            raise SoundLost(_HALTED)
+        if self._played.halted:
+            raise SoundLost(HALTED)
 
     def _number(self) -> int:
         self._presentation += 1
@@ -489,77 +366,6 @@ def _members(fields: Mapping[str, Any]) -> Members:
         name: value.astype(np.float64).tobytes() if isinstance(value, np.ndarray) else value
         for name, value in fields.items()
     }
-
-
-def check_signal(samples: Floats, plan: RenderPlan) -> None:
-    """InputError where a prepared signal is beyond the limits of a plan.
-
-    The running mean square is taken to be at its limit when the signal begins, whatever was felt
-    before.
-    """
-    if samples.ndim != 1 or not samples.size or not np.isfinite(samples).all():
-        what = "NaN or inf" if samples.ndim == 1 and samples.size else f"shape {samples.shape}"
-        raise InputError(f"expected a signal as (n,) finite numbers in g, got {what}; correct it.")
-    limits = plan.limits
-    peak = float(np.abs(samples).max())
-    if peak > limits.peak:
-        raise InputError(
-            f"expected a signal of at most {limits.peak:g} g, got {peak:.4g} g; lower it or raise "
-            "the rig's limit."
-        )
-    if np.isfinite(limits.rms):
-        squares = _mean_squares(samples, plan) + _left_of_limit(samples.size, plan)
-        if squares.max() > limits.mean_square * (1 + 1e-9):
-            raise InputError(
-                f"expected a signal with a running RMS of at most {limits.rms:g} g, got "
-                f"{np.sqrt(squares.max()):.4g} g; lower it or raise the rig's limit."
-            )
-    longest = _longest_run(np.abs(samples) > limits.silence, plan.samples(limits.pause_s))
-    if np.isfinite(limits.duration_s) and longest > plan.samples(limits.duration_s):
-        raise InputError(
-            f"expected a signal of at most {limits.duration_s:g} s without a pause, got "
-            f"{longest / plan.rate_hz:.4g} s; shorten it or raise the rig's limit."
-        )
-
-
-def largest_factor(samples: Floats, plan: RenderPlan) -> float:
-    """The largest factor by which a signal (n,) may be multiplied; refused above by `check_signal`.
-
-    Limits of peak and running RMS count, not that of the duration.
-    """
-    peak = float(np.abs(samples).max(initial=0.0))
-    if not peak:
-        return float("inf")
-    factor = plan.limits.peak / peak
-    if np.isfinite(plan.limits.rms):
-        room = plan.limits.mean_square - _left_of_limit(samples.size, plan)
-        squares = _mean_squares(samples, plan)
-        felt = squares > 0
-        factor = min(factor, float(np.sqrt((room[felt] / squares[felt]).min())))
-    return float(factor)
-
-
-def _mean_squares(samples: Floats, plan: RenderPlan) -> Floats:
-    """Running mean squares (g²) of a signal after silence, (n,)."""
-    from scipy.signal import lfilter
-
-    return np.asarray(lfilter([plan.mean_share], [1, plan.mean_share - 1], samples**2))
-
-
-def _left_of_limit(count: int, plan: RenderPlan) -> Floats:
-    """What is left, sample by sample, of a running mean square that was at its limit before."""
-    kept = (1.0 - plan.mean_share) ** np.arange(1, count + 1, dtype=np.float64)
-    return np.asarray(plan.limits.mean_square * kept)
-
-
-def _longest_run(loud: np.ndarray[Any, np.dtype[np.bool_]], pause: int) -> int:
-    """Samples from the first to the last loud one, where no pause is between."""
-    where = np.flatnonzero(loud)
-    if not where.size:
-        return 0
-    begins = np.concatenate([[0], np.flatnonzero(np.diff(where) > pause) + 1])
-    ends = np.concatenate([begins[1:] - 1, [where.size - 1]])
-    return int((where[ends] - where[begins]).max()) + 1
 
 
 def _check_channels(channels: int, vibration: int, *, masking: int | None) -> None:

@@ -19,7 +19,7 @@ from modeling import InputError, TextureModel, compensation_for
 from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, HEARTBEAT_S, Live, now_s
 from rig.setup.rig_file import SHIPPED_RIG_FILE
 from rig.sound.devices import SoundDevice
-from rig.sound.output import SoundLost
+from rig.sound.supervision import SoundLost
 from stimuli.planted.textures import planted_texture
 from stimuli.planted.vibrators import planted_vibrator
 from tests.refusals import refused

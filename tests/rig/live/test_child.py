@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -196,3 +197,15 @@ def test_its_rooms_are_those_of_its_parent_though_not_installed_and_though_files
         text=True,
     )
     assert f"({house / 'modeling/errors.py'})" in told.stdout, told.stderr
+
+
+def test_a_suspended_process_does_not_hold_up_who_sends_it_a_long_message(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It reads nothing, and the pipe is full long before the message's end."""
+    monkeypatch.setattr("rig.live.child.ANSWER_S", 0.3)
+    process = started()
+    os.kill(process.pid, signal.SIGSTOP)
+    with pytest.raises(ChildLost, match="SIGKILL"):
+        process.send(Say("x" * 1_000_000))
+    assert not process.runs

@@ -22,7 +22,8 @@ from modeling import InputError
 from modeling.rendering.limits import Limits
 from modeling.rendering.plan import RELEASE_S
 from rig.live.memory import BLOCK, CONTACT, GONE, HEARTBEAT_S, NO_HEARTBEAT, STALE, Live, now_s
-from rig.sound.output import SoundLost, SoundOutput
+from rig.sound.output import SoundOutput
+from rig.sound.supervision import SoundLost
 from tests.modeling.rendering.lattices import planted_ar
 from tests.refusals import refused
 from tests.rig.live.replay import Log, engine_of

@@ -21,8 +21,10 @@ from modeling.rendering.limits import Limits
 from modeling.rendering.plan import RenderPlan, plan_for
 from modeling.vibrators.compensation import compensation_for
 from rig.live.memory import Live
-from rig.sound.output import SoundLost, SoundOutput, check_signal, largest_factor
+from rig.sound.output import SoundOutput
+from rig.sound.signal_limits import check_signal, largest_factor
 from rig.sound.signals import stimuli_of_surfaces, stimulus, tone_burst
+from rig.sound.supervision import SoundLost
 from stimuli.planted.textures import planted_texture
 from stimuli.planted.vibrators import planted_vibrator
 from stimuli.sets.recipe import Recipe
