@@ -16,7 +16,7 @@ HOMES = {
     "study.task_plan": "TaskPlan",
     "study.models": "ModelSets",
     "study.design": "SessionPlan fisher_yates",
-    "sessions.store": "StoreError",
+    "sessions.writer": "StoreError",
     "sessions.task": "Task",
     "sessions.running": "Circumstances run_session",
     "sessions.trial_loop": "People SessionResult run_trials",
@@ -35,11 +35,11 @@ if TYPE_CHECKING:
     from experiments.observers.whole_study import simulate_study as simulate_study
     from experiments.sessions.running import Circumstances as Circumstances
     from experiments.sessions.running import run_session as run_session
-    from experiments.sessions.store import StoreError as StoreError
     from experiments.sessions.task import Task as Task
     from experiments.sessions.trial_loop import People as People
     from experiments.sessions.trial_loop import SessionResult as SessionResult
     from experiments.sessions.trial_loop import run_trials as run_trials
+    from experiments.sessions.writer import StoreError as StoreError
     from experiments.study.design import SessionPlan as SessionPlan
     from experiments.study.design import fisher_yates as fisher_yates
     from experiments.study.models import ModelSets as ModelSets

@@ -15,7 +15,7 @@ from experiments.sessions.overrides import Overrides
 from experiments.sessions.program import program_facts
 from experiments.sessions.resume import resumption
 from experiments.sessions.roster import Roster, RosterEntry
-from experiments.sessions.store import SessionStore
+from experiments.sessions.session_store import SessionStore
 from experiments.sessions.stored_sessions import held_session
 from experiments.sessions.surfaces import Intake
 from experiments.sessions.task import Task

@@ -14,7 +14,7 @@ from experiments.sessions.files import SessionFiles
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.program import program_facts
 from experiments.sessions.roster import Roster
-from experiments.sessions.store import SessionStore
+from experiments.sessions.session_store import SessionStore
 from modeling.files.hashes import sha256_of_values
 from rig.interface import HandRows, PresentationRecord
 from tests.experiments.sessions.enrolling import enrolled

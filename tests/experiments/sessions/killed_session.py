@@ -24,7 +24,7 @@ import numpy as np
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.resume import resumption
 from experiments.sessions.roster import Roster
-from experiments.sessions.store import SessionStore
+from experiments.sessions.session_store import SessionStore
 from modeling import InputError
 from modeling.files.hashes import sha256_of_values
 from rig.interface import HandRows, PresentationRecord

@@ -26,7 +26,7 @@ from experiments.sessions.bids_physio import RATE_HZ, at_regular_times
 from experiments.sessions.bids_tables import cell, table_bytes
 from experiments.sessions.files import SessionFiles
 from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.store import SessionStore
+from experiments.sessions.session_store import SessionStore
 from experiments.study.models import ModelSets
 from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan

@@ -20,9 +20,9 @@ from experiments.sessions.log import read_log
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.roster import Roster
 from experiments.sessions.running import Circumstances, run_session
+from experiments.sessions.session_store import SessionStore
 from experiments.sessions.state import session_state
 from experiments.sessions.status import study_progress
-from experiments.sessions.store import SessionStore
 from experiments.sessions.surfaces import Intake, Rating, SessionAborted, Surfaces
 from experiments.sessions.trial_loop import People, SessionResult
 from experiments.sessions.writer import StoreError

@@ -8,8 +8,8 @@ import pytest
 
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.roster import Roster
+from experiments.sessions.session_store import SessionStore
 from experiments.sessions.status import TaskProgress, study_progress
-from experiments.sessions.store import SessionStore
 from experiments.sessions.withdrawing import drop_out, withdraw
 from modeling import InputError
 from tests.refusals import refused

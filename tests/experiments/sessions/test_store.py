@@ -25,9 +25,11 @@ from experiments.sessions.files import SessionFiles, sessions_in
 from experiments.sessions.log import line_of, read_log
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.overrides import Overrides
+from experiments.sessions.session_store import SessionStore
 from experiments.sessions.state import session_state
-from experiments.sessions.store import MemoryStore, SessionStore, Store, StoreError
+from experiments.sessions.store import MemoryStore, Store
 from experiments.sessions.tables import GrowingTable, cell
+from experiments.sessions.writer import StoreError
 from modeling import InputError
 from modeling.files.columns import Column
 from modeling.files.reading import reason_of

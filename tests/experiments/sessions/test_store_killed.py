@@ -18,8 +18,8 @@ from experiments.sessions.log import line_of, read_log
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.resume import Resumption, resumption
 from experiments.sessions.roster import Roster
+from experiments.sessions.session_store import SessionStore
 from experiments.sessions.state import session_state
-from experiments.sessions.store import SessionStore
 from tests.experiments.sessions.enrolling import enrolled
 
 ManifestOf = Callable[..., SessionManifest]

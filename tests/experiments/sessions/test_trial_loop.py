@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from experiments.sessions.agenda import Agenda
-from experiments.sessions.store import MemoryStore, StoreError
+from experiments.sessions.store import MemoryStore
 from experiments.sessions.surfaces import Intake, Rating, SessionAborted, Surfaces
 from experiments.sessions.trial_loop import People, SessionResult, run_trials
+from experiments.sessions.writer import StoreError
 from experiments.study.models import ModelSets
 from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan

@@ -17,7 +17,7 @@ from experiments.sessions import withdrawing
 from experiments.sessions.bids import Exported, export_all
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.roster import Roster
-from experiments.sessions.store import SessionStore
+from experiments.sessions.session_store import SessionStore
 from experiments.sessions.withdrawing import drop_out, files_of, withdraw
 from modeling import InputError
 from tests.experiments.sessions.enrolling import enrolled
