@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
+from analysis.answers.gathering import Gathered
 from analysis.answers.order import (
     Planned,
     check_manifest,
@@ -19,6 +18,16 @@ from analysis.answers.order import (
 )
 from analysis.answers.plan import AnalysisPlan, plan_from
 from analysis.answers.responses import PlannedTask, Responses, stands_apart
+from analysis.answers.tables import (
+    MAY_DIFFER,
+    check_known,
+    check_session,
+    check_simulated,
+    checked_sidecar,
+    json_object,
+    read_answers_table,
+    valid_trials,
+)
 from analysis.labels import MODELS
 from modeling import InputError
 from modeling.errors import shown
@@ -26,20 +35,11 @@ from modeling.files.answer_tables import (
     ANSWER_TABLES,
     PARTICIPANT_COLUMNS,
     PARTICIPANT_ID,
-    AnswerColumn,
 )
-from modeling.files.columns import Column, names, shortened_hash
-from modeling.files.documents import read_json_object
+from modeling.files.columns import shortened_hash
 from modeling.files.hashes import sha256_of_values
-from modeling.files.tables import read_table
 
 _SIMULATED = ("Simulated", "SimulatedParticipant", "SimulatedRig")
-_RESTS_ON = ("StudySHA256", "ModelsSHA256")
-# In what a session may differ if its manifest records the reason, and under which word.
-_MAY_DIFFER = {"StudySHA256": "study", "ModelsSHA256": "models", "Pilot": "pilot"}
-# Times to the millisecond: two participants do not have so many equal ones by chance.
-FEWEST_TIMES = 3
-_ADVICE = "correct it, or delete the file, which tactileq study status makes again from the log"
 
 
 def load_responses(data_folder: str | Path, *, leaving_out: Collection[str] = ()) -> Responses:
@@ -75,8 +75,8 @@ def load_responses(data_folder: str | Path, *, leaving_out: Collection[str] = ()
     description = _description(folder)
     models = _models(description, folder)
     simulated = {key: bool(description.get(key)) for key in _SIMULATED}
-    origin = {**simulated, **{key: description[key] for key in _MAY_DIFFER if key in description}}
-    gathered = _Gathered(models, frozenset(leaving_out))
+    origin = {**simulated, **{key: description[key] for key in MAY_DIFFER if key in description}}
+    gathered = Gathered(models, frozenset(leaving_out))
     participants = simulated["SimulatedParticipant"]
     dropped = _dropped_out(folder / "participants.tsv", simulated=participants)
     tables = {
@@ -121,7 +121,7 @@ def _description(folder: Path) -> Mapping[str, object]:
             f"expected {path}, which is not there; name the folder of a study, the one that "
             f"holds dataset_description.json."
         )
-    description = _json_object(path)
+    description = json_object(path)
     if not isinstance(description.get("Simulated"), bool):
         raise InputError(
             f'expected "Simulated": true or false in {path}; add it, so that no one takes '
@@ -140,58 +140,6 @@ def _description(folder: Path) -> Mapping[str, object]:
             f"{shortened_hash(str(stated))}, got {shortened_hash(found)}; restore the file."
         )
     return description
-
-
-class _Gathered:
-    """What is gathered while one session after the other is read."""
-
-    def __init__(
-        self, models: Mapping[str, Mapping[str, str]], leaving_out: frozenset[str]
-    ) -> None:
-        self.textures = frozenset(models)
-        self.sets = tuple(next(iter(models.values()), {}))
-        self.equal: dict[str, list[Sequence[str]]] = {}
-        self.plans: dict[str, None] = {}  # in the order of the sessions
-        self.warnings: list[str] = []
-        self.leaving_out = leaving_out
-        # Sessions of those who are left out that cannot be read, or have no answer, by task.
-        self.unread: dict[str, list[dict[str, str]]] = {}
-        self.under_way: dict[str, set[str]] = {}
-        # Numbers of main trials that sessions of a task were planned with.
-        self.main_trials: dict[str, set[int]] = {}
-        self.pilots: set[tuple[str, str, str]] = set()
-        self._whose: dict[str, str] = {}
-
-    def add(self, sidecar: Mapping[str, object]) -> None:
-        """The plan of a session, and the groups of equal models that it names."""
-        if isinstance(plan := sidecar.get("PlanSHA256"), str):
-            self.plans[plan] = None
-        stated = sidecar.get("Identical")
-        for texture, groups in stated.items() if isinstance(stated, Mapping) else ():
-            known = self.equal.setdefault(str(texture), [])
-            known += [tuple(group) for group in groups if tuple(group) not in known]
-
-    def add_unread(self, task: str, participant: str, *, session: str) -> None:
-        """A session of somebody who is left out, of which nothing more is known."""
-        unread = {"participant_id": participant, "session": session}
-        self.unread.setdefault(task, []).append(unread)
-
-    def add_order(self, task: str, planned: Sequence[Planned]) -> None:
-        """How many main trials a session was planned with."""
-        main = sum(trial["phase"] == "main" for trial in planned)
-        self.main_trials.setdefault(task, set()).add(main)
-
-    def check_once(self, table: pd.DataFrame, what: str, *, path: Path) -> None:
-        """Refuse answers that are those of another session to the last digit of every time."""
-        if "response_time_s" not in table or table["response_time_s"].nunique() < FEWEST_TIMES:
-            return
-        text = table.to_csv(index=False)
-        if text in self._whose:
-            raise InputError(
-                f"expected answers of its own in {path}, found those of {self._whose[text]}, with "
-                "the same response times; leave one of the two sessions out."
-            )
-        self._whose[text] = what
 
 
 def _plan(description: Mapping[str, object], hashes: Iterable[str], *, path: Path) -> AnalysisPlan:
@@ -233,16 +181,12 @@ def _planned(
     return planned
 
 
-def _json_object(path: Path) -> Mapping[str, object]:
-    return read_json_object(path, advice="restore the file")
-
-
 def _dropped_out(path: Path, *, simulated: bool) -> frozenset[str]:
     """Participants who dropped out, from the list of participants, which is checked."""
     if not path.is_file():
         raise InputError(f"expected {path}, which is not there; restore the list of participants.")
-    table = _read(path, (PARTICIPANT_ID, *PARTICIPANT_COLUMNS))
-    _check_simulated(table, simulated, path=path)
+    table = read_answers_table(path, (PARTICIPANT_ID, *PARTICIPANT_COLUMNS))
+    check_simulated(table, simulated, path=path)
     return frozenset(table["participant_id"][table["status"] == "dropped"])
 
 
@@ -271,7 +215,7 @@ def _load_task(
     task: str,
     *,
     origin: Mapping[str, object],
-    gathered: _Gathered,
+    gathered: Gathered,
 ) -> pd.DataFrame | None:
     """All sessions of one task beneath each other, or None where there is none."""
     sessions, warnings = [], gathered.warnings
@@ -299,7 +243,7 @@ def _load_session(
     task: str,
     *,
     origin: Mapping[str, object],
-    gathered: _Gathered,
+    gathered: Gathered,
     unordered: list[str],
 ) -> pd.DataFrame:
     """The answers of one session; `unordered` takes its name where it has no manifest."""
@@ -310,10 +254,10 @@ def _load_session(
             f"move the file back to its own participant's folder."
         )
     what = f"{participant} {task} {session}"
-    sidecar = _checked_sidecar(path.with_suffix(".json"), origin, what, warnings=warnings)
-    table = _read(path, ANSWER_TABLES[task].columns)
-    _check_session(table, task, path=path, simulated=bool(origin["Simulated"]))
-    _check_known(table, gathered, path=path)
+    sidecar = checked_sidecar(path.with_suffix(".json"), origin, what, warnings=warnings)
+    table = read_answers_table(path, ANSWER_TABLES[task].columns)
+    check_session(table, task, path=path, simulated=bool(origin["Simulated"]))
+    check_known(table, gathered, path=path)
     gathered.check_once(table, what, path=path)
     planned = _planned_of(path, (participant, session, task), sidecar=sidecar)
     owed = None if planned is None else open_sessions_warning(table, planned)
@@ -325,7 +269,7 @@ def _load_session(
         warnings.append(f"{what} {owed}")
     check_order(table, planned, path=path)
     gathered.add(sidecar)
-    table = _valid(table, what, warnings=warnings)
+    table = valid_trials(table, what, warnings=warnings)
     if (pilot := table["pilot"] == "true").any():
         answers = "its answers are not data of the study"
         if not origin.get("Pilot", False):
@@ -351,71 +295,12 @@ def _planned_of(
     manifest /= path.name.removesuffix("beh.tsv") + "manifest.json"
     if not manifest.is_file():
         return None
-    stored = _json_object(manifest)
+    stored = json_object(manifest)
     check_manifest(stored, manifest, sidecar=sidecar)
     return planned_trials(stored, session, path=manifest)
 
 
-def _valid(table: pd.DataFrame, what: str, *, warnings: list[str]) -> pd.DataFrame:
-    """The answers to trials in which the rig presented what was planned; warns of the others."""
-    failed = table["valid"] == 0
-    if failed.any():
-        again = int((failed & table["trial"].isin(table["repeats"])).sum())
-        warnings.append(
-            f"{what}: {int(failed.sum())} of {len(table)} answers left out, since the rig failed "
-            f"in their trials ({again} repeated)."
-        )
-    return table[~failed].reset_index(drop=True)
-
-
-def _checked_sidecar(
-    path: Path, origin: Mapping[str, object], what: str, *, warnings: list[str]
-) -> Mapping[str, object]:
-    """The sidecar of a session, refused where it says otherwise than the data set what it is of."""
-    if not path.is_file() and any(key in origin for key in _RESTS_ON):
-        raise InputError(
-            f"expected the sidecar {path}, which names the study and the models of the session, "
-            "found none; restore the file."
-        )
-    sidecar = _json_object(path) if path.is_file() else {}
-    allowed = _overridden(sidecar, what, warnings=warnings)
-    warnings += _damaged(sidecar, what)
-    for key, value in origin.items():
-        if sidecar.get(key, value) == value or _MAY_DIFFER.get(key) in allowed:
-            continue
-        found = "another" if key in _RESTS_ON else json.dumps(sidecar[key])
-        wanted = f"one {key}" if key in _RESTS_ON else f"{key} {json.dumps(value)}"
-        raise InputError(
-            f"expected {wanted} in {path}, as dataset_description.json says, "
-            f"never a mixture, but found {found}; correct the file or leave "
-            "its session out."
-        )
-    return sidecar
-
-
-def _overridden(sidecar: Mapping[str, object], what: str, *, warnings: list[str]) -> frozenset[str]:
-    """The rules that a session overrode, each with its reason."""
-    stated = sidecar.get("Overrides", [])
-    records = [r for r in stated if isinstance(r, Mapping)] if isinstance(stated, list) else []
-    for record in records:
-        warnings.append(
-            f"{what} was continued against a rule ({record.get('what')}): {record.get('reason')}."
-        )
-    return frozenset(str(record.get("what")) for record in records)
-
-
-def _damaged(sidecar: Mapping[str, object], what: str) -> list[str]:
-    """A sentence for what of a session's traces is damaged, and in none of its tables."""
-    stated = sidecar.get("Damaged")
-    tables = stated.values() if isinstance(stated, Mapping) else ()
-    return [
-        f"{what}: damaged and left out: {row}."
-        for rows in tables
-        for row in (rows if isinstance(rows, list) else [])
-    ]
-
-
-def _unanswered(folder: Path, task: str, *, gathered: _Gathered) -> list[str]:
+def _unanswered(folder: Path, task: str, *, gathered: Gathered) -> list[str]:
     """A sentence for each session that was begun but whose answers are not there."""
     sentences = []
     for manifest in sorted(folder.glob(f"sourcedata/sub-*/ses-*/*_task-{task}_manifest.json")):
@@ -431,84 +316,6 @@ def _unanswered(folder: Path, task: str, *, gathered: _Gathered) -> list[str]:
                 "running, or tactileq study status makes one."
             )
     return sentences
-
-
-def _check_session(table: pd.DataFrame, task: str, *, path: Path, simulated: bool) -> None:
-    """Refuse what each cell may be, but all of them together cannot."""
-    columns = {column.name: column for column in ANSWER_TABLES[task].columns}
-    _check_simulated(table, simulated, path=path)
-    twice = table.duplicated("trial")
-    _refuse(twice, table["trial"], expected="every trial once", path=path)
-    _check_choices(table, columns, path=path)
-
-
-def _check_known(table: pd.DataFrame, gathered: _Gathered, *, path: Path) -> None:
-    """Refuse textures and sets of models that the study does not have, where it is known."""
-    if not gathered.sets:
-        return
-    sets, textures = gathered.sets, sorted(gathered.textures)
-    of_textures = ("texture", *(known.other_texture for known in ANSWER_TABLES.values()))
-    named = [(column, textures, "textures") for column in dict.fromkeys(of_textures) if column]
-    for column, known, what in (("model", sets, "sets of models"), *named):
-        if column in table:
-            other = ~table[column].isin(list(known)) & table[column].notna()
-            expected = f"{' or '.join(known)}, the study's {what}, in column {column}"
-            _refuse(other, table[column], expected=expected, path=path)
-
-
-def _check_choices(table: pd.DataFrame, columns: Mapping[str, AnswerColumn], *, path: Path) -> None:
-    """Where there is a right answer: whether `correct` agrees with it and it was on a button."""
-    if not {"answer", "correct"} <= columns.keys():
-        return
-    answered = table[table["answer"].notna()]
-    if "layout" in columns and columns["answer"].limits is None:
-        layouts = [str(layout).split("|") for layout in answered["layout"]]
-        absent = [
-            answer not in layout for answer, layout in zip(answered["answer"], layouts, strict=True)
-        ]
-        _refuse(
-            pd.Series(absent, index=answered.index, dtype=bool),
-            answered["answer"],
-            expected="an answer that stands in its trial's layout",
-            path=path,
-        )
-    right = columns["answer"].right
-    _refuse(
-        (answered["answer"] == answered[right]).astype(float) != answered["correct"],
-        answered["correct"],
-        expected=f"correct = 1 exactly where answer and {right} agree",
-        path=path,
-    )
-
-
-def _check_simulated(table: pd.DataFrame, simulated: bool, *, path: Path) -> None:
-    expected = "true" if simulated else "false"
-    _refuse(
-        table["simulated"] != expected,
-        table["simulated"],
-        expected=f"simulated = {expected}, as dataset_description.json says, never a mixture,",
-        path=path,
-    )
-
-
-def _refuse(wrong: pd.Series, column: pd.Series, *, expected: str, path: Path) -> None:
-    if wrong.any():
-        row = int(np.flatnonzero(wrong.to_numpy())[0])
-        value = column.loc[wrong[wrong].index[0]]
-        found = "n/a" if pd.isna(value) else value
-        raise InputError(
-            f"expected {expected} in {path}, but answer {row + 1} has {shown(found)}; correct the "
-            "file or leave it out."
-        )
-
-
-def _read(path: Path, columns: Sequence[Column]) -> pd.DataFrame:
-    """A table of BIDS: numbers as floats, NaN where there is no value."""
-    rows = read_table(path, columns, bids=True, advice=_ADVICE)
-    header = dict.fromkeys([*names(columns), *(rows[0] if rows else ())])
-    table = pd.DataFrame(rows, columns=list(header), dtype=object)
-    numbers = dict.fromkeys((c.name for c in columns if c.limits is not None), float)
-    return table.astype(numbers).fillna(np.nan)
 
 
 def _split(

@@ -20,7 +20,8 @@ from modeling.errors import InputError
 from modeling.models.parameter_table import Parameters
 from modeling.models.texture_model import TextureModel
 from modeling.recordings.spectrum import smooth
-from modeling.scenes.scene import Bound, Range
+from modeling.scenes.hands import Range
+from modeling.scenes.scene import Bound
 from modeling.similarity import BAND_EDGES_HZ, HIGHEST_SHARE, LOWEST_HZ, SIGMAS_HZ
 
 BANDS = 9

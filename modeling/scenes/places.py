@@ -15,7 +15,7 @@ from modeling.arrays import Bools, Floats, Integers
 from modeling.errors import InputError
 from modeling.hand import Hand
 from modeling.models.texture_model import TextureModel
-from modeling.scenes.scene import AskedRange, HandPlaces, HandRange, HandUse, Range
+from modeling.scenes.hands import AskedRange, HandPlaces, HandRange, HandUse, Range
 
 LEAST_VISITED = 0.01  # of the hand's time, over which a bound may be broken
 

@@ -12,8 +12,8 @@ from modeling.hand import Hand
 from modeling.models.grid import Cells
 from modeling.models.parameter_table import NEXT
 from modeling.models.texture_model import TextureModel
+from modeling.scenes.hands import Range
 from modeling.scenes.places import Places, nodes_of
-from modeling.scenes.scene import Range
 from modeling.scenes.thinning import Nodes
 
 

@@ -14,9 +14,10 @@ from modeling.hand import Hand
 from modeling.models.texture_model import TextureModel
 from modeling.rendering.renderer import Renderer
 from modeling.scenes.compiled import CompiledTexture
+from modeling.scenes.hands import STROKE_HZ, HandRange, HandUse
 from modeling.scenes.measures import ComparedBand, Features, errors_between
 from modeling.scenes.places import ranges_of
-from modeling.scenes.scene import STROKE_HZ, HandRange, HandUse, Scene
+from modeling.scenes.scene import Scene
 from modeling.seeds import generator
 
 WINDOW_S = 1.0

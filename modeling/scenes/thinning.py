@@ -19,9 +19,10 @@ import numpy as np
 
 from modeling.arrays import Bools, Floats, Integers
 from modeling.scenes.error_maps import ErrorMaps, Segment, segments_of
+from modeling.scenes.hands import Range
 from modeling.scenes.measures import Errors
 from modeling.scenes.places import Places, enclosing
-from modeling.scenes.scene import Bound, Range
+from modeling.scenes.scene import Bound
 
 Nodes = tuple[int, ...]
 NO_LIMIT = 2**62

@@ -41,8 +41,8 @@ from modeling.fitting.conditions import recording_spectra
 from modeling.models.loading import AnyModel, load_model
 from modeling.recordings.trajectory import load_trajectory
 from modeling.scenes.compiled import load_compiled
+from modeling.scenes.hands import HandRange
 from modeling.scenes.places import places_of
-from modeling.scenes.scene import HandRange
 from rig.capture.grid import StrokeGrid
 from rig.capture.pieces import PieceStore, Plan
 from rig.desk.parts import hand_settings

@@ -87,7 +87,7 @@ from benches.scenes.section import (
 )
 from modeling import Scene, compile_scene, fit_ar
 from modeling.files.columns import Column, Columns, chosen, names, without
-from modeling.scenes.scene import HandRange
+from modeling.scenes.hands import HandRange
 from modeling.scenes.strokes import windows_kept
 from stimuli.planted.textures import PlantedSurface, planted_texture, record_texture
 from tests.analysis.conftest import answered_of, by_model, people_summary

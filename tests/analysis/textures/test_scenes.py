@@ -18,7 +18,7 @@ from analysis.textures.scenes import (
 )
 from modeling import CompiledScene, Scene, compile_scene
 from modeling.files.columns import names
-from modeling.scenes.scene import HandRange
+from modeling.scenes.hands import HandRange
 from stimuli.planted.textures import planted_texture
 
 

@@ -21,8 +21,8 @@ from benches.scenes.examples import (
 )
 from benches.scenes.section import scene_section
 from modeling import Scene, compile_scene, fit_ar
+from modeling.scenes.hands import HandRange
 from modeling.scenes.places import places_of
-from modeling.scenes.scene import HandRange
 from modeling.scenes.strokes import windows_kept
 from stimuli.planted.textures import TEXTURES, PlantedSurface, planted_texture, record_texture
 

@@ -13,7 +13,8 @@ from modeling.equalizer.bands import band_rms
 from modeling.perception.thresholds import Threshold
 from modeling.scenes.compiled import CompiledTexture
 from modeling.scenes.compiler import compile_scene
-from modeling.scenes.scene import Bound, HandRange, Scene
+from modeling.scenes.hands import HandRange
+from modeling.scenes.scene import Bound, Scene
 
 
 def varied_model(

@@ -23,10 +23,11 @@ from modeling.rendering.plan import plan_for
 from modeling.scenes.compiled import CompiledTexture
 from modeling.scenes.compiler import compile_scene
 from modeling.scenes.error_maps import ErrorMaps
+from modeling.scenes.hands import HandRange
 from modeling.scenes.limit_losses import clipped_loss_db
 from modeling.scenes.measures import ComparedBand, Errors, errors_between
 from modeling.scenes.places import places_of
-from modeling.scenes.scene import Actuator, Bound, Budget, HandRange, Scene
+from modeling.scenes.scene import Actuator, Bound, Budget, Scene
 from tests.refusals import refused
 
 ModelMaker = Callable[..., TextureModel]

@@ -14,8 +14,9 @@ from modeling.perception.signs_of_rest import SignsOfRest
 from modeling.perception.thresholds import Threshold
 from modeling.scenes.compiled import CompiledTexture
 from modeling.scenes.felt import kept_layers
+from modeling.scenes.hands import HandRange
 from modeling.scenes.places import places_of
-from modeling.scenes.scene import Actuator, HandRange, Scene
+from modeling.scenes.scene import Actuator, Scene
 from stimuli.planted.textures import TEXTURES, planted_texture
 from tests.refusals import refused
 

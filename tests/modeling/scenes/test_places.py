@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from modeling import InputError, TextureModel
+from modeling.scenes.hands import HandRange, distributed_hand
 from modeling.scenes.places import Places, places_of
-from modeling.scenes.scene import HandRange, distributed_hand
 from tests.refusals import refused
 
 ModelMaker = Callable[..., TextureModel]

@@ -9,14 +9,8 @@ import pytest
 
 from modeling import InputError, Scene
 from modeling.recordings.trajectory import Trajectory
-from modeling.scenes.scene import (
-    Bound,
-    Budget,
-    HandPlaces,
-    HandRange,
-    distributed_hand,
-    recorded_hand,
-)
+from modeling.scenes.hands import HandPlaces, HandRange, distributed_hand, recorded_hand
+from modeling.scenes.scene import Bound, Budget
 from tests.refusals import refused
 
 LEAST = """

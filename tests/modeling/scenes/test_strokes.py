@@ -13,10 +13,11 @@ import pytest
 from modeling import InputError, Renderer, TextureModel, fit_texture
 from modeling.recordings.trajectory import Trajectory
 from modeling.scenes.compiled import CompiledTexture
+from modeling.scenes.hands import HandRange, HandUse, distributed_hand
+from modeling.scenes.hands import recorded_hand as recorded
 from modeling.scenes.measures import ComparedBand, errors_between
 from modeling.scenes.places import ranges_of
-from modeling.scenes.scene import Actuator, HandRange, HandUse, Scene, distributed_hand
-from modeling.scenes.scene import recorded_hand as recorded
+from modeling.scenes.scene import Actuator, Scene
 from modeling.scenes.strokes import Windows, random_stroke, windows_kept
 from stimuli.planted.drawn import draw_surface
 from stimuli.planted.textures import planted_texture
