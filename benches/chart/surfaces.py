@@ -21,7 +21,8 @@ from modeling.hand import Hand
 from modeling.models.grid import Condition, grid_axes
 from modeling.models.loading import load_model, models_in
 from modeling.recordings.recording_set import load_usable, textures_in
-from rig.importing.hatt import HattTexture, load_hatt
+from rig.importing.hatt import HattTexture
+from rig.importing.hatt_reader import load_hatt
 from stimuli.planted.drawn import draw_surface
 from stimuli.planted.textures import (
     FORCES_N,

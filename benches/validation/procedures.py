@@ -24,12 +24,22 @@ from analysis.statistics.rates import clopper_pearson
 from benches.raters import (
     HIGHEST,
     LOWEST,
-    at_random,
     bootstrap_covers,
     covered,
-    ended,
-    mean_at_the_end,
     paired_power,
+)
+from benches.validation.worlds import (
+    DIFFERENCE_SD,
+    LATENT,
+    N_TEXTURES,
+    RATE_WORLDS,
+    RATING_WORLDS,
+    Draw,
+    confusions,
+    equal_slopes,
+    rates_of_people,
+    single_choices,
+    single_ratings,
 )
 from modeling.arrays import Floats
 from modeling.checks import check_whole
@@ -37,19 +47,8 @@ from modeling.files.columns import Column, names
 from modeling.seeds import generator, number_of
 
 SIZES = (8, 20, 36)  # participants
-DIFFERENCE_SD = 11.0  # of participants' differences, in points; 7.5 are 0.68 of it
-PERSON_SD = 6.0  # of participants' means
-MIDDLE = 60.0  # mean rating, far from both ends
 BOUNDS: Bounds = (-7.5, 7.5)
-LATENT = -10.0  # difference that a ceiling hides
-AT_END = 0.65  # share of the reference's ratings at 100 there
-CARELESS = 0.2  # share of participants who answer at random
-ABORTED = 0.15  # share of participants who do not finish
 HIGHEST_SHARE_AT_ENDS = 0.2
-TEXTURES = 7
-TRIALS = 21  # of the forced choice, of one participant with one model
-ANSWERS = 3  # single ratings of one participant with one model
-ANSWER_SD = 8.0  # of single ratings, around what a participant feels
 COVERAGE, TYPE_I, POWER = "coverage", "type I error", "power"
 AT_ONCE = 100  # simulations: keeps what the bootstrap holds below 200 MB
 
@@ -75,87 +74,6 @@ MEANINGS = {
 }
 
 Hits = NDArray[np.bool_]
-Draw = Callable[[np.random.Generator, tuple[int, int], float], Floats]
-
-
-def _ratings(person: Floats, difference: Floats) -> Floats:
-    """Ratings (k, n, 2) of the reference and of the other model, the difference apart."""
-    return np.stack([person, person + difference], axis=-1)
-
-
-def _people(rng: np.random.Generator, shape: tuple[int, int]) -> Floats:
-    return rng.normal(MIDDLE, PERSON_SD, shape)
-
-
-def _normal(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> Floats:
-    return _ratings(_people(rng, shape), rng.normal(truth, DIFFERENCE_SD, shape))
-
-
-def _skewed(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> Floats:
-    """Exponential differences: skewness 2."""
-    spread = rng.exponential(1.0, shape) - 1.0
-    return _ratings(_people(rng, shape), truth + DIFFERENCE_SD * spread)
-
-
-def _heavy_tails(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> Floats:
-    """Differences of Student's t with 3 degrees of freedom, whose SD is √3."""
-    spread = rng.standard_t(3, shape) / sqrt(3)
-    return _ratings(_people(rng, shape), truth + DIFFERENCE_SD * spread)
-
-
-def _ceiling(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> Floats:
-    """Latent ratings that end at 100, where `AT_END` of the reference's lie."""
-    noise_sd = DIFFERENCE_SD / sqrt(2)
-    middle = mean_at_the_end(AT_END, sd=float(np.hypot(PERSON_SD, noise_sd)))
-    latent = rng.normal(middle, PERSON_SD, shape)[..., None] + rng.normal(0, noise_sd, (*shape, 2))
-    return ended(latent + np.array([0.0, truth]))
-
-
-def _careless(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> Floats:
-    """Some participants answer at random, uniformly over the scale."""
-    ratings = _normal(rng, shape, truth)
-    random = rng.random(shape) < CARELESS
-    ratings[random] = at_random(rng, (*shape, 2))[random]
-    return ratings
-
-
-def _aborted(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> Floats:
-    """Participants who do not finish have no complete cells, independently of their ratings."""
-    ratings = _normal(rng, shape, truth)
-    ratings[rng.random(shape) < ABORTED] = np.nan
-    return ratings
-
-
-def _rates(
-    rng: np.random.Generator, shape: tuple[int, int], truth: float, *, concentration: float = 5.0
-) -> Floats:
-    """Shares of right answers (k, n) of people whose abilities follow a beta distribution."""
-    ability = rng.beta(concentration * truth, concentration * (1 - truth), shape)
-    return rng.binomial(TRIALS, ability) / TRIALS
-
-
-def _careless_rates(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> Floats:
-    guessed = rng.binomial(TRIALS, 1 / TEXTURES, shape) / TRIALS
-    return np.where(rng.random(shape) < CARELESS, guessed, _rates(rng, shape, truth))
-
-
-def _aborted_rates(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> Floats:
-    return np.where(rng.random(shape) < ABORTED, np.nan, _rates(rng, shape, truth))
-
-
-SITUATIONS: Mapping[str, Draw] = {
-    "normal": _normal,
-    "skewed": _skewed,
-    "heavy tails": _heavy_tails,
-    "ceiling": _ceiling,
-    "careless raters": _careless,
-    "aborted sessions": _aborted,
-}
-RATE_SITUATIONS: Mapping[str, Draw] = {
-    "normal": _rates,
-    "careless raters": _careless_rates,
-    "aborted sessions": _aborted_rates,
-}
 
 
 def _each_size(values: Floats) -> Iterator[tuple[NDArray[np.intp], Floats]]:
@@ -199,7 +117,7 @@ def _family_rejects(ratings: Floats, truth: float, rng: np.random.Generator) -> 
     p = np.full(len(ratings), np.nan)
     for which, differences in _each_size(_differences(ratings)):
         p[which] = t_tests(differences)[1]
-    families = p.reshape(-1, TEXTURES)
+    families = p.reshape(-1, N_TEXTURES)
     return np.array([bool((holm(family) < ALPHA).any()) for family in families])
 
 
@@ -241,43 +159,11 @@ def _bootstrap_covers(rates: Floats, truth: float, rng: np.random.Generator) -> 
     return _hits_of_rows(rates, lambda complete: bootstrap_covers(complete, truth, rng))
 
 
-def _confusions(
-    rng: np.random.Generator, shape: tuple[int, int], truth: float, *, concentration: float = 5.0
-) -> Floats:
-    """Counts (k, n, 7, 7) of people whose abilities follow a beta distribution.
-
-    `truth` is their mean share of right answers; wrong ones fall on all others alike.
-    """
-    ability = rng.beta(concentration * truth, concentration * (1 - truth), shape)
-    right = np.eye(TEXTURES)
-    wrong = (1 - right) / (TEXTURES - 1)
-    shares = ability[..., None, None] * right + (1 - ability)[..., None, None] * wrong
-    return rng.multinomial(TRIALS // TEXTURES, shares).astype(float)
-
-
 def _information_covers(counts: Floats, truth: float, rng: np.random.Generator) -> Hits:
-    pooled = truth * np.eye(TEXTURES) + (1 - truth) * (1 - np.eye(TEXTURES)) / (TEXTURES - 1)
+    pooled = truth * np.eye(N_TEXTURES) + (1 - truth) * (1 - np.eye(N_TEXTURES)) / (N_TEXTURES - 1)
     bits = float(information_bits(pooled))
     found = [transferred_information(each) for each in counts]
     return covered([one.ci_low for one in found], bits, [one.ci_high for one in found])
-
-
-def _single_ratings(
-    rng: np.random.Generator, shape: tuple[int, int], truth: float, *, sd: float = DIFFERENCE_SD
-) -> Floats:
-    """Single ratings (k, n, 2, 3) of people whose differences vary by `sd`."""
-    felt = _ratings(_people(rng, shape), rng.normal(truth, sd, shape))
-    return felt[..., None] + rng.normal(0, ANSWER_SD, (*shape, 2, ANSWERS))
-
-
-def _equal_slopes(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> Floats:
-    return _single_ratings(rng, shape, truth, sd=0.0)
-
-
-def _single_choices(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> Floats:
-    """Right and wrong answers (k, n, 2, 21); abilities with either model vary independently."""
-    ability = rng.beta(5 * truth, 5 * (1 - truth), (*shape, 2))
-    return (rng.random((*shape, 2, TRIALS)) < ability[..., None]).astype(float)
 
 
 def _columns_of(answers: Floats) -> tuple[NDArray[np.intp], Floats]:
@@ -403,7 +289,7 @@ class Check:
     per_simulation: int = 1
 
 
-_GUARDED = {name: SITUATIONS[name] for name in ("normal", "ceiling")}
+_GUARDED = {name: RATING_WORLDS[name] for name in ("normal", "ceiling")}
 _CHECKS = (
     Check(
         procedure="paired t, 95 % interval",
@@ -411,7 +297,7 @@ _CHECKS = (
         hits=_t_covers,
         nominal=_always(CONFIDENCE),
         truth=BOUNDS[1],
-        situations=SITUATIONS,
+        situations=RATING_WORLDS,
     ),
     Check(
         procedure="paired t",
@@ -419,7 +305,7 @@ _CHECKS = (
         hits=_t_rejects,
         nominal=_always(ALPHA),
         truth=0.0,
-        situations=SITUATIONS,
+        situations=RATING_WORLDS,
     ),
     Check(
         procedure="paired t",
@@ -427,16 +313,16 @@ _CHECKS = (
         hits=_t_rejects,
         nominal=t_test_power,
         truth=BOUNDS[1],
-        situations=SITUATIONS,
+        situations=RATING_WORLDS,
     ),
     Check(
         procedure="Holm over seven textures",
         quantity=TYPE_I,
         hits=_family_rejects,
-        nominal=_always(1 - (1 - ALPHA / TEXTURES) ** TEXTURES),
+        nominal=_always(1 - (1 - ALPHA / N_TEXTURES) ** N_TEXTURES),
         truth=0.0,
-        situations=SITUATIONS,
-        per_simulation=TEXTURES,
+        situations=RATING_WORLDS,
+        per_simulation=N_TEXTURES,
     ),
     Check(
         procedure="TOST",
@@ -444,7 +330,7 @@ _CHECKS = (
         hits=_equivalent,
         nominal=equivalence_power,
         truth=BOUNDS[0],
-        situations=SITUATIONS,
+        situations=RATING_WORLDS,
     ),
     Check(
         procedure="TOST",
@@ -452,7 +338,7 @@ _CHECKS = (
         hits=_equivalent,
         nominal=equivalence_power,
         truth=0.0,
-        situations=SITUATIONS,
+        situations=RATING_WORLDS,
     ),
     Check(
         procedure="TOST, no guard on ends",
@@ -484,7 +370,7 @@ _CHECKS = (
         hits=_d_z_covers,
         nominal=_always(CONFIDENCE),
         truth=BOUNDS[1],
-        situations=SITUATIONS,
+        situations=RATING_WORLDS,
     ),
     Check(
         procedure="sign flips",
@@ -492,7 +378,7 @@ _CHECKS = (
         hits=_flips_reject,
         nominal=_level_of_flips,
         truth=0.0,
-        situations=SITUATIONS,
+        situations=RATING_WORLDS,
     ),
     Check(
         procedure="BCa interval of a correct rate",
@@ -500,7 +386,7 @@ _CHECKS = (
         hits=_bootstrap_covers,
         nominal=_always(CONFIDENCE),
         truth=0.4,
-        situations=RATE_SITUATIONS,
+        situations=RATE_WORLDS,
     ),
     Check(
         procedure="BCa interval of a correct rate",
@@ -508,7 +394,7 @@ _CHECKS = (
         hits=_bootstrap_covers,
         nominal=_always(CONFIDENCE),
         truth=0.95,
-        situations={"ceiling": _rates},
+        situations={"ceiling": rates_of_people},
     ),
     Check(
         procedure="interval of transferred information",
@@ -516,7 +402,7 @@ _CHECKS = (
         hits=_information_covers,
         nominal=_always(CONFIDENCE),
         truth=0.5,
-        situations={"normal": _confusions},
+        situations={"normal": confusions},
     ),
     Check(
         procedure="interval of transferred information",
@@ -524,7 +410,7 @@ _CHECKS = (
         hits=_information_covers,
         nominal=_always(CONFIDENCE),
         truth=0.85,
-        situations={"ceiling": _confusions},
+        situations={"ceiling": confusions},
     ),
     Check(
         procedure="mixed model, 95 % interval",
@@ -532,7 +418,7 @@ _CHECKS = (
         hits=_mixed_covers,
         nominal=_always(CONFIDENCE),
         truth=BOUNDS[1],
-        situations={"normal": _single_ratings, "equal slopes": _equal_slopes},
+        situations={"normal": single_ratings, "equal slopes": equal_slopes},
     ),
     Check(
         procedure="GEE",
@@ -540,7 +426,7 @@ _CHECKS = (
         hits=_gee_rejects,
         nominal=_always(ALPHA),
         truth=0.5,
-        situations={"normal": _single_choices},
+        situations={"normal": single_choices},
     ),
     Check(
         procedure="GEE",
@@ -548,7 +434,7 @@ _CHECKS = (
         hits=_gee_rejects,
         nominal=_always(ALPHA),
         truth=0.95,
-        situations={"ceiling": _single_choices},
+        situations={"ceiling": single_choices},
     ),
 )
 Cell = tuple[int, str, int]  # number of a check, situation, participants

@@ -13,15 +13,8 @@ from experiments.console import intake_pages, trial_pages
 from experiments.console.languages import Texts
 from experiments.console.page_runner import PageHook, PageRunner
 from experiments.console.screens import open_window
-from experiments.sessions.surfaces import (
-    Choice,
-    ChoiceTrial,
-    Intake,
-    Note,
-    RatedTrial,
-    Rating,
-    Surfaces,
-)
+from experiments.sessions.people import Choice, ChoiceTrial, Intake, RatedTrial, Rating
+from experiments.sessions.surfaces import Note, Surfaces
 from experiments.sessions.task import Task
 from experiments.study.study import TASKS
 from experiments.tasks import task_named

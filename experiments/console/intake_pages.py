@@ -7,7 +7,7 @@ from functools import partial
 from experiments.console.drawing import CARD, CONSOLE_GREY, CONSOLE_ORANGE, PALE, text
 from experiments.console.page_runner import PageRunner
 from experiments.console.widgets import Button
-from experiments.sessions.surfaces import Intake, SessionAborted
+from experiments.sessions.people import Intake, SessionAborted
 from experiments.study.questions import MOST_DIGITS, MOST_LEVELS, Question
 
 REFUSED = "consent refused"

@@ -13,7 +13,8 @@ from experiments.console.languages import Texts
 from experiments.console.page import Page
 from experiments.console.parts import PageParts
 from experiments.console.widgets import Button, FocusRing, Widget
-from experiments.sessions.surfaces import Note, SessionAborted, Surfaces
+from experiments.sessions.people import SessionAborted
+from experiments.sessions.surfaces import Note, Surfaces
 
 # --- Parameters -----------------------------------------------------------------------------
 

@@ -9,7 +9,8 @@ from typing import Any
 from experiments.console.drawing import CONSOLE_ORANGE, INK, SMALL_HEIGHT, Point
 from experiments.console.page_runner import PageRunner
 from experiments.console.widgets import Button, RatingScale
-from experiments.sessions.surfaces import Choice, RatedTrial, Rating, Surfaces
+from experiments.sessions.people import Choice, RatedTrial, Rating
+from experiments.sessions.surfaces import Surfaces
 from experiments.sessions.task import Task
 
 BUTTONS_PER_ROW = 7

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from experiments.sessions.surfaces import ProgressReport
+from experiments.sessions.people import ProgressReport
 
 
 class SimulatedExperimenter:

@@ -20,15 +20,8 @@ from experiments.observers.psychometrics import (
     choice_shares,
     with_effect,
 )
-from experiments.sessions.surfaces import (
-    Choice,
-    ChoiceTrial,
-    Intake,
-    Note,
-    RatedTrial,
-    Rating,
-    Surfaces,
-)
+from experiments.sessions.people import Choice, ChoiceTrial, Intake, RatedTrial, Rating
+from experiments.sessions.surfaces import Note, Surfaces
 from experiments.study.questions import Question
 from experiments.study.study import TASKS
 from experiments.tasks.oddity import OddityTrial

@@ -12,12 +12,12 @@ from experiments.sessions.log import read_log
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.order import draw_session
 from experiments.sessions.overrides import Overrides
+from experiments.sessions.people import Intake
 from experiments.sessions.program import program_facts
 from experiments.sessions.resume import resumption
 from experiments.sessions.roster import Roster, RosterEntry
 from experiments.sessions.session_store import SessionStore
 from experiments.sessions.stored_sessions import held_session
-from experiments.sessions.surfaces import Intake
 from experiments.sessions.task import Task
 from experiments.sessions.trial_loop import People, SessionResult, run_trials
 from experiments.study.design import SessionPlan, Trial

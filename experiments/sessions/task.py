@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from experiments.sessions.surfaces import Respondent, Surfaces
+from experiments.sessions.people import Respondent
+from experiments.sessions.surfaces import Surfaces
 from experiments.study.design import Occasion, Order, Trial
 from experiments.study.models import ModelSets
 from modeling.files.answer_tables import ANSWER_TABLES, AnswerColumn

@@ -14,16 +14,16 @@ from dataclasses import dataclass, replace
 from statistics import median
 
 from experiments.sessions.agenda import Agenda
-from experiments.sessions.store import Store
-from experiments.sessions.strokes import advice_on, outside_grid
-from experiments.sessions.surfaces import (
+from experiments.sessions.people import (
     Experimenter,
     Intake,
     ProgressReport,
     Respondent,
     SessionAborted,
-    Surfaces,
 )
+from experiments.sessions.store import Store
+from experiments.sessions.strokes import advice_on, outside_grid
+from experiments.sessions.surfaces import Surfaces
 from experiments.sessions.task import Task
 from experiments.study.design import SessionPlan, Trial
 from experiments.study.models import ModelSets

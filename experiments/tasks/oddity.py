@@ -12,7 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from experiments.sessions.surfaces import Respondent, Surfaces
+from experiments.sessions.people import Respondent
+from experiments.sessions.surfaces import Surfaces
 from experiments.sessions.task import Task
 from experiments.study.design import Occasion, Order, Trial, fisher_yates
 from experiments.study.models import ModelSets

@@ -122,7 +122,8 @@ def import_csv(
     Example: tactileq import csv *.csv --labels labels.tsv --map time=Zeit,z=Kanal_1 --mv-per-g 100
     """
     from modeling.files.hashes import sha256_of_paths
-    from rig.importing.files import import_csv_file, parse_columns, usable
+    from rig.importing.csv_columns import parse_columns
+    from rig.importing.files import import_csv_file, usable
 
     role_of = parse_columns(columns) if columns is not None else {}
     if time_column is not None:
@@ -186,8 +187,8 @@ def import_hatt(
     """
     from modeling.files.hashes import sha256_of_paths
     from rig.importing.files import Imported
-    from rig.importing.hatt import load_hatt
     from rig.importing.hatt_grid import spanning_grid
+    from rig.importing.hatt_reader import load_hatt
     from rig.importing.plausible import doubts_about
 
     if own_conditions and (speed or force):

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from time import monotonic
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -23,24 +20,16 @@ from tactileq.options import (
     ThresholdName,
 )
 from tactileq.own_results import check_own_results
+from tactileq.power_in_memory import chances, people_of, planned_for
 from tactileq.printing import print_models, progress
-from tactileq.workers import working
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from analysis.answers.responses import PlannedTask, Responses
-    from analysis.power.power import Verdict
-    from analysis.statistics.participants.posterior import Effort
-    from experiments.observers.in_memory import Row
-    from experiments.observers.percepts import Perception
-    from experiments.observers.psychometrics import Psychometrics
-    from experiments.study.models import ModelSets
     from experiments.study.study import Study
     from modeling.files.folders import Contents
 
 PICTURE_DPI = 150
-FIRST_ANSWER_S = 12.0  # then the next simulation to end is waited for
 
 
 def power(
@@ -132,30 +121,6 @@ def power(
     _write(table, plan, out, seen=seen, seed=seed, settings=settings, inputs=inputs)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class SimulatedStudy:
-    """A study with the simulated people who take part in it.
-
-    Parameters
-    ----------
-    study : Study
-        With as many participants as the largest n.
-    models : ModelSets
-    perception : Perception
-    psychometrics : Psychometrics
-    """
-
-    study: Study
-    models: ModelSets
-    perception: Perception
-    psychometrics: Psychometrics
-
-    @property
-    def tasks(self) -> tuple[str, ...]:
-        """Those that claims are about."""
-        return tuple(dict.fromkeys(claim.task for claim in self.study.plan.claims))
-
-
 def sizes_of(text: str) -> tuple[int, ...]:
     """Numbers of participants from `from,to,step`, or from a list in brackets.
 
@@ -179,41 +144,6 @@ def sizes_of(text: str) -> tuple[int, ...]:
             f"in brackets ([8,20,36]), got {shown(text)}; correct --subjects."
         )
     return tuple(sorted(set(numbers)))
-
-
-def planned_for(plan: Study, sizes: Sequence[int]) -> Study:
-    """The study with the largest number of participants in each task that a claim is about.
-
-    Raises
-    ------
-    ValueError
-        If there is no claim, a claim is about a task that compares no models, or a number of
-        participants is too small for the rule of the plan or leaves the order of models unbalanced.
-    """
-    from experiments.study.study import FEWEST_OF_MODEL
-    from modeling.files.answer_tables import ANSWER_TABLES
-
-    if not plan.plan.claims:
-        raise ValueError(
-            "expected claims under [[plan.claims]] in the study, whose verdicts are simulated, got "
-            "none; add the study's claims (tactileq study init shows how)."
-        )
-    for claim in plan.plan.claims:
-        if not ANSWER_TABLES[claim.task].measures:
-            raise ValueError(
-                f"expected claims about tasks that compare models, got {claim.name} about "
-                f"{claim.task}; leave it out."
-            )
-    if plan.plan.rule == "model" and min(sizes) < FEWEST_OF_MODEL:
-        raise ValueError(
-            f'expected {FEWEST_OF_MODEL} participants or more, as the rule of the plan is "model", '
-            f"got {min(sizes)}; correct --subjects."
-        )
-    tasks = {claim.task for claim in plan.plan.claims}
-    for n in sizes:  # each has to be a study that can be run
-        with_n = {task: replace(plan.plan_of(task), participants=n) for task in tasks}
-        study = replace(plan, tasks={**plan.tasks, **with_n})
-    return study
 
 
 def planted_effects(effects: Sequence[str], textures: Sequence[str]) -> dict[str, dict[str, float]]:
@@ -247,172 +177,6 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def people_of(
-    study: Study,
-    sets: ModelSets,
-    *,
-    threshold: str,
-    planted: dict[str, dict[str, float]],
-) -> SimulatedStudy:
-    """Who takes part, with the planted textures as real surfaces.
-
-    Raises
-    ------
-    ValueError
-        For a texture that is not among them, and for models that are missing.
-    """
-    from experiments.observers.percepts import Perception
-    from experiments.observers.psychometrics import Psychometrics
-    from experiments.observers.simulated import require_plantable
-    from modeling import Threshold
-    from stimuli.planted.textures import TEXTURES, planted_texture
-
-    if unknown := [name for name in study.textures if name not in TEXTURES]:
-        raise ValueError(
-            f"expected a study of the planted textures {', '.join(TEXTURES)}, which take the place "
-            f"of the real surfaces, got {', '.join(unknown)}; plan with textures of these names."
-        )
-    sets.require(study)
-    psychometrics = Psychometrics(planted=planted)
-    perception = Perception(
-        study,
-        real={name: planted_texture(name) for name in study.textures},
-        models=sets,
-        threshold=Threshold.named(threshold),
-    )
-    require_plantable(perception, psychometrics)
-    return SimulatedStudy(
-        study=study, models=sets, perception=perception, psychometrics=psychometrics
-    )
-
-
-def chances(
-    people: SimulatedStudy,
-    sizes: Sequence[int],
-    *,
-    simulations: int,
-    seed: int,
-    jobs: int | None = None,
-    dask: str | None = None,
-    effort: Effort | None = None,
-    advance: Callable[[str], None] = lambda item: None,
-    first: Callable[[pd.DataFrame, float], None] = lambda table, left_s: None,
-) -> pd.DataFrame:
-    """The chance of each verdict on each claim, by n.
-
-    docs/method/power.md#first-n
-
-    Parameters
-    ----------
-    people : SimulatedStudy
-    sizes : sequence of int
-        Numbers of participants, none above those of the study.
-    simulations : int
-    seed : int
-        ≥ 0.
-    jobs : int, optional
-        Processes; as many as cores without it. No number of them changes the table.
-    dask : str, optional
-        Address of a scheduler.
-    effort : Effort, optional
-        Of the model of the participants, where it decides.
-    advance : callable, optional
-        Called after each simulation.
-    first : callable, optional
-        Called once, after `FIRST_ANSWER_S`, with the table so far and the estimated time left (s);
-        not called if all simulations are done by then.
-
-    Returns
-    -------
-    DataFrame
-        `analysis.power.power.POWER_COLUMNS`.
-    """
-    from analysis.power.power import power_table
-
-    work = partial(simulated_verdicts, people, sizes, seed=seed, effort=effort)
-    found: dict[int, list[Verdict]] = {}
-    began_s = first_s = monotonic()
-    sentence = False
-    with working(work, range(simulations), jobs=jobs, dask=dask) as done:
-        for number, one in done:
-            found[number] = one
-            advance("")
-            now_s, count = monotonic(), len(found)
-            if count == 1:
-                first_s = now_s  # before it, workers were begun
-            elif not sentence and count < simulations and now_s - began_s >= FIRST_ANSWER_S:
-                sentence = True
-                so_far = (one for each in found.values() for one in each)
-                left_s = (simulations - count) * (now_s - first_s) / (count - 1)
-                first(power_table(so_far, simulations=count), left_s)
-    in_order = (one for number in sorted(found) for one in found[number])
-    return power_table(in_order, simulations=simulations)
-
-
-def simulated_verdicts(
-    people: SimulatedStudy,
-    sizes: Sequence[int],
-    number: int,
-    *,
-    seed: int,
-    effort: Effort | None = None,
-) -> list[Verdict]:
-    """All verdicts of one simulation: the largest study, and its first n participants."""
-    from analysis.power.power import verdicts_by_size
-    from experiments.observers.in_memory import simulate_sessions
-    from modeling.seeds import generator
-
-    rng = generator(seed, number)
-    rows = simulate_sessions(
-        people.study,
-        models=people.models,
-        perception=people.perception,
-        psychometrics=people.psychometrics,
-        seed=int(rng.integers(2**63)),
-        subjects=range(1, max(sizes) + 1),
-        tasks=people.tasks,
-    )
-    by_size = {n: responses_of(people, rows, n=n) for n in sizes}
-    return verdicts_by_size(by_size, rng=rng, effort=effort)
-
-
-def responses_of(people: SimulatedStudy, rows: dict[str, list[Row]], *, n: int) -> Responses:
-    """The answers of the first n participants as if they had been loaded."""
-    import pandas as pd
-
-    from analysis.answers.plan import plan_from
-    from analysis.answers.responses import Responses, stands_apart
-
-    answers, anchors = {}, {}
-    for task, of_task in rows.items():
-        table = pd.DataFrame(of_task)
-        table = table[(table["participant"] <= n) & (table["phase"] == "main")]
-        table = table.assign(participant_id=table["participant"].map("sub-{:04d}".format))
-        apart = stands_apart(table, task)
-        answers[task], anchors[task] = table[~apart], table[apart]
-    return Responses(
-        answers=answers,
-        simulated_participants=True,
-        simulated_rig=True,
-        anchors=anchors,
-        equal=people.models.equal_models(people.study.textures),
-        plan=plan_from(people.study.plan.to_dict(), path=Path("study")),
-        planned=_planned(people, n=n),
-    )
-
-
-def _planned(people: SimulatedStudy, *, n: int) -> dict[str, PlannedTask]:
-    from analysis.answers.responses import PlannedTask
-    from experiments.tasks.durations import trials_of_session
-
-    study, planned = people.study, {}
-    for task in people.tasks:
-        plan, sessions = study.plan_of(task), n * study.sessions(task)
-        _, trials = trials_of_session(study, task)
-        planned[task] = PlannedTask(n, sessions, plan.models, plan.repeats, sessions * trials)
-    return planned
 
 
 def _write(

@@ -48,7 +48,7 @@ from rig.capture.pieces import PieceStore, Plan
 from rig.desk.parts import hand_settings
 from rig.hand.scripted import ScriptedTrajectory
 from rig.importing.files import import_csv, import_wav
-from rig.importing.hatt import load_hatt
+from rig.importing.hatt_reader import load_hatt
 from rig.importing.labels import Label, labels_from_table
 from rig.setup.rig_file import SHIPPED_RIG_FILE, Figure, RigFile
 from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers

@@ -18,7 +18,8 @@ import pytest
 from analysis.answers.loading import load_responses
 from experiments.sessions.log import read_log
 from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.surfaces import Choice, Rating, Surfaces
+from experiments.sessions.people import Choice, Rating
+from experiments.sessions.surfaces import Surfaces
 from rig.desk.lock import rig_locked
 from rig.setup.rig_file import RigFile
 from stimuli.planted.textures import planted_texture

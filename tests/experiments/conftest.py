@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from experiments.sessions.surfaces import Choice, Rating, Surfaces
+from experiments.sessions.people import Choice, Rating
+from experiments.sessions.surfaces import Surfaces
 from experiments.study.models import ModelSets
 from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan

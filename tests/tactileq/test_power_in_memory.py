@@ -33,15 +33,14 @@ from modeling import InputError, Threshold, simplify
 from modeling.files.claims import ClaimSection, PlanSection
 from rig.twin import SimulatedRig
 from stimuli.planted.textures import planted_texture
-from tactileq.commands.power import (
+from tactileq.commands.power import planted_effects, sizes_of
+from tactileq.power_in_memory import (
     SimulatedStudy,
     chances,
     people_of,
     planned_for,
-    planted_effects,
     responses_of,
     simulated_verdicts,
-    sizes_of,
 )
 from tactileq.workers import working
 from tests.refusals import refused
@@ -185,7 +184,7 @@ def test_a_first_answer_comes_before_all_simulations_are_done(
 ) -> None:
     who, sizes = people(study, models, most=6), (4, 6)
     heard: list[tuple[pd.DataFrame, float]] = []
-    monkeypatch.setattr("tactileq.commands.power.FIRST_ANSWER_S", 0.0)
+    monkeypatch.setattr("tactileq.power_in_memory.FIRST_ANSWER_S", 0.0)
 
     def run(simulations: int) -> pd.DataFrame:
         def hear(table: pd.DataFrame, left_s: float) -> None:
@@ -197,7 +196,7 @@ def test_a_first_answer_comes_before_all_simulations_are_done(
     ((table, left_s),) = heard
     pd.testing.assert_frame_equal(table, run(2))
     assert left_s > 0
-    monkeypatch.setattr("tactileq.commands.power.FIRST_ANSWER_S", 3600.0)
+    monkeypatch.setattr("tactileq.power_in_memory.FIRST_ANSWER_S", 3600.0)
     run(3)
     assert len(heard) == 1
 

@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 
 from experiments.sessions.log import read_log
 from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.surfaces import SessionAborted, Surfaces
+from experiments.sessions.people import SessionAborted
+from experiments.sessions.surfaces import Surfaces
 from experiments.study.study import Study
 from modeling import InputError
 from tactileq.commands.session import session

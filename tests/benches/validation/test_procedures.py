@@ -7,13 +7,8 @@ import pytest
 from scipy import stats
 
 from analysis.statistics.rates import clopper_pearson
-from benches.validation.procedures import (
-    RATE_SITUATIONS,
-    SITUATIONS,
-    cells,
-    equivalence_power,
-    simulate_cell,
-)
+from benches.validation.procedures import cells, equivalence_power, simulate_cell
+from benches.validation.worlds import RATE_WORLDS, RATING_WORLDS
 from modeling import InputError
 from tests.refusals import refused
 
@@ -137,16 +132,16 @@ def test_situations_plant_what_they_say():
     rng = np.random.default_rng(3)
     shape = (40, 1000)
     for name in ("normal", "skewed", "heavy tails"):
-        ratings = SITUATIONS[name](rng, shape, -3.0)
+        ratings = RATING_WORLDS[name](rng, shape, -3.0)
         differences = ratings[..., 1] - ratings[..., 0]
         assert differences.mean() == pytest.approx(-3.0, abs=0.3)
         assert differences.std() == pytest.approx(11.0, rel=0.1)
-    ceiling = SITUATIONS["ceiling"](rng, shape, -10.0)
+    ceiling = RATING_WORLDS["ceiling"](rng, shape, -10.0)
     assert (ceiling[..., 0] == 100).mean() == pytest.approx(0.65, abs=0.02)
-    assert np.isnan(SITUATIONS["aborted sessions"](rng, shape, 0.0)).any(axis=-1).mean() == (
+    assert np.isnan(RATING_WORLDS["aborted sessions"](rng, shape, 0.0)).any(axis=-1).mean() == (
         pytest.approx(0.15, abs=0.02)
     )
-    assert RATE_SITUATIONS["normal"](rng, shape, 0.4).mean() == pytest.approx(0.4, abs=0.01)
+    assert RATE_WORLDS["normal"](rng, shape, 0.4).mean() == pytest.approx(0.4, abs=0.01)
 
 
 def simulate_small(one: tuple[int, str, int]) -> dict:

@@ -21,7 +21,8 @@ import time
 from psychopy import visual
 
 from experiments.console.console import Console
-from experiments.sessions.surfaces import Intake, SessionAborted, Surfaces
+from experiments.sessions.people import Intake, SessionAborted
+from experiments.sessions.surfaces import Surfaces
 from experiments.study.questions import Question
 from experiments.tasks.absolute import AbsoluteTrial
 from experiments.tasks.oddity import OddityTrial

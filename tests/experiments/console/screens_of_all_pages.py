@@ -21,7 +21,8 @@ from experiments.console import page_runner
 from experiments.console.console import Console
 from experiments.console.drawing import HALF_RISE
 from experiments.console.languages import Texts
-from experiments.sessions.surfaces import Intake, SessionAborted, Surfaces
+from experiments.sessions.people import Intake, SessionAborted
+from experiments.sessions.surfaces import Surfaces
 from experiments.study.questions import MOST_LEVELS, Question
 from experiments.study.study import Study
 from experiments.tasks.absolute import AbsoluteTrial

@@ -13,7 +13,8 @@ from scipy import stats
 from experiments.observers.percepts import Perception, distance, sensation_levels
 from experiments.observers.psychometrics import RATED_SCALES, Psychometrics, Trait, choice_shares
 from experiments.observers.simulated import SimulatedParticipant, require_plantable
-from experiments.sessions.surfaces import Intake, Surfaces
+from experiments.sessions.people import Intake
+from experiments.sessions.surfaces import Surfaces
 from experiments.study.models import ModelSets
 from experiments.study.questions import Question
 from experiments.study.study import Study

@@ -18,12 +18,13 @@ from experiments.sessions import program
 from experiments.sessions.bids import export_all, export_session
 from experiments.sessions.log import read_log
 from experiments.sessions.manifest import SessionManifest
+from experiments.sessions.people import Intake, Rating, SessionAborted
 from experiments.sessions.roster import Roster
 from experiments.sessions.running import Circumstances, run_session
 from experiments.sessions.session_store import SessionStore
 from experiments.sessions.state import session_state
 from experiments.sessions.status import study_progress
-from experiments.sessions.surfaces import Intake, Rating, SessionAborted, Surfaces
+from experiments.sessions.surfaces import Surfaces
 from experiments.sessions.trial_loop import People, SessionResult
 from experiments.sessions.writer import StoreError
 from experiments.study.models import ModelSets

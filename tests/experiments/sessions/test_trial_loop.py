@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from experiments.sessions.agenda import Agenda
+from experiments.sessions.people import Intake, Rating, SessionAborted
 from experiments.sessions.store import MemoryStore
-from experiments.sessions.surfaces import Intake, Rating, SessionAborted, Surfaces
+from experiments.sessions.surfaces import Surfaces
 from experiments.sessions.trial_loop import People, SessionResult, run_trials
 from experiments.sessions.writer import StoreError
 from experiments.study.models import ModelSets

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.sessions.surfaces import Choice, Surfaces
+from experiments.sessions.people import Choice
+from experiments.sessions.surfaces import Surfaces
 from experiments.tasks.threshold import FREQUENCIES_HZ, ThresholdTrial
 from experiments.tasks.threshold_posterior import Answer, next_level_db
 from modeling.files.answer_tables import ANSWER_TABLES

@@ -13,14 +13,8 @@ from scipy.io import wavfile
 from scipy.signal import welch
 
 from modeling import InputError, RecordingSet
-from rig.importing.files import (
-    import_csv,
-    import_csv_file,
-    import_wav,
-    import_wav_file,
-    parse_columns,
-    usable,
-)
+from rig.importing.csv_columns import parse_columns
+from rig.importing.files import import_csv, import_csv_file, import_wav, import_wav_file, usable
 from rig.importing.labels import Label, labels_from_table
 from tests.refusals import check_refusal, refused
 

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from scipy.signal import freqz, welch
 
 from modeling import InputError, fit_ar, fit_texture, similarity
-from rig.importing.hatt import HattTexture, load_hatt
+from rig.importing.hatt import HattTexture
+from rig.importing.hatt_reader import load_hatt
 from tests.refusals import refused
 
 Xml = Callable[..., str]

@@ -11,8 +11,9 @@ import pytest
 from scipy.spatial import Delaunay
 
 from modeling import InputError
-from rig.importing.hatt import HattTexture, load_hatt
+from rig.importing.hatt import HattTexture
 from rig.importing.hatt_grid import spanning_grid
+from rig.importing.hatt_reader import load_hatt
 from tests.refusals import refused
 
 Xml = Callable[..., str]
