@@ -199,13 +199,13 @@ def _width_em(line: str) -> float:
 # --- Shapes ---------------------------------------------------------------------------------
 
 
-def card(window: Any, *, box: Box) -> Any:
+def card(window: Any, *, box: Box, radius: float = 0.02) -> Any:
     """A white card with round corners, on which other things stand."""
     from psychopy import visual
 
     return visual.ShapeStim(
         window,
-        vertices=rounded(box[2:], 0.02),
+        vertices=rounded(box[2:], radius),
         pos=box[:2],
         fillColor=CARD,
         lineColor=PALE,

@@ -15,9 +15,9 @@ from experiments.feel.plots import (
     LiveText,
     Marker,
     Scale,
-    card,
     decades,
     line,
+    panel_card,
 )
 from experiments.feel.rigs import HandNow
 from experiments.feel.textures import Texture
@@ -129,7 +129,7 @@ class SpectrumPlot:
         heading = "Playing: spectrum at this speed and force (dB re 1 g²/Hz)"
         at = (left + 0.02, top - 0.026)
         self._fixed = [
-            card(window, box=box),
+            panel_card(window, edges=box),
             text(window, heading, at=at, height=HEADING_HEIGHT, bold=True, anchor="left"),
             *self._axes.decoration(window),
             line(
@@ -190,7 +190,7 @@ class LayerPanel:
         )
         self._floor = amplitude[0]
         self._fixed = [
-            card(window, box=box),
+            panel_card(window, edges=box),
             *self._axes.decoration(window),
             *self._threshold(window, yardstick, highest_hz=highest_hz),
             *self._legend(window, box, yardstick),
@@ -293,7 +293,7 @@ class HandPanel:
             y=_linear(1.3 * strongest),
         )
         self._fixed = [
-            card(window, box=box),
+            panel_card(window, edges=box),
             text(
                 window,
                 "Hand: force (N), speed (mm/s)",

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from experiments.console.drawing import CARD, CONSOLE_GREY, INK, PALE, Point, rounded, text
+from experiments.console.drawing import CARD, CONSOLE_GREY, INK, PALE, Point, card, text
 from modeling.arrays import Floats
 
 TICK_HEIGHT = 0.019
@@ -102,21 +102,11 @@ def line(
     )
 
 
-def card(window: Any, *, box: tuple[float, float, float, float]) -> Any:
-    """The white ground of one part of the page."""
-    from psychopy import visual
-
-    left, bottom, right, top = box
-    return visual.ShapeStim(
-        window,
-        vertices=rounded((right - left, top - bottom), 0.012),
-        pos=((left + right) / 2, (bottom + top) / 2),
-        fillColor=CARD,
-        lineColor=PALE,
-        lineWidth=1,
-        units="height",
-        autoLog=False,
-    )
+def panel_card(window: Any, *, edges: tuple[float, float, float, float]) -> Any:
+    """The white ground of one part of the page, from its left, bottom, right and top."""
+    left, bottom, right, top = edges
+    middle = ((left + right) / 2, (bottom + top) / 2)
+    return card(window, box=(*middle, right - left, top - bottom), radius=0.012)
 
 
 class CachedPicture:

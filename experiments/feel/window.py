@@ -16,7 +16,7 @@ from experiments.console.page import Page
 from experiments.console.screens import open_window
 from experiments.console.widgets import Button
 from experiments.feel.panels import HandPanel, LayerPanel, Layout, SpectrumPlot, layout_for
-from experiments.feel.plots import TICK_HEIGHT, CachedPicture, LiveText, card
+from experiments.feel.plots import TICK_HEIGHT, CachedPicture, LiveText, panel_card
 from experiments.feel.view import (
     HIGHEST_SHARE,
     PLACE_WORDS,
@@ -219,8 +219,8 @@ class FeelWindow:
             widgets=[*self._texture_buttons(layout), *self._mode_buttons(layout)],
             decoration=[
                 lead,
-                card(self.window, box=layout.textures),
-                card(self.window, box=layout.status),
+                panel_card(self.window, edges=layout.textures),
+                panel_card(self.window, edges=layout.status),
                 *self._spectrum.fixed(),
                 *self._layers.fixed(),
                 *self._hand.fixed(),

@@ -26,7 +26,7 @@ live_texts = []
 pointed = set()
 
 
-def show_words(**what):
+def report(**what):
     print(json.dumps(what), flush=True)
 
 
@@ -43,14 +43,14 @@ class NotingRig:
     halted = False
 
     def present_model(self, model):
-        show_words(asked=[model.texture, model.n_layers])
+        report(asked=[model.texture, model.n_layers])
 
     def silence(self):
         self.faults = ("the tablet is gone.",)
-        show_words(asked=["silence"])
+        report(asked=["silence"])
 
     def mask(self, on):
-        show_words(asked=["mask", on])
+        report(asked=["mask", on])
 
     def point(self, x, y, *, inside):
         if inside:
@@ -83,7 +83,7 @@ def on_frame(shown):
         shown.window.saveMovieFrames(wanted)
     left, top = shown.window.winHandle.get_location()
     handles = {name: (left + x, top + y) for name, (x, y) in shown.handles().items()}
-    show_words(frame=handles, words=[text.content for text in live_texts])
+    report(frame=handles, words=[text.content for text in live_texts])
 
 
 def visit_in(size):
@@ -94,7 +94,7 @@ def visit_in(size):
     visit = Visit(textures, NotingRig())
     with window.FeelWindow(visit, yardstick, size=size, on_frame=on_frame) as shown:
         shown.run()
-    show_words(ended=True, pointed=sorted(pointed))
+    report(ended=True, pointed=sorted(pointed))
 
 
 window.LiveText = panels.LiveText = NotedText
