@@ -251,7 +251,7 @@ def test_a_task_costs_its_file_and_columns_and_a_chapter_its_folder_and_a_line(
     succeed(house, "-c", MODELS, folder=work)
     checked = succeed(house, "-m", "tactileq", "study", "check", "study.toml", folder=work)
     assert "pair: 4 participants, 1 session each, 1 training + 12 main trials" in checked
-    assert "pairs are told alike: No equality in any case" in checked
+    assert "pairs are told alike: No equality unless full models are recognised" in checked
     succeed(house, "-m", "tactileq", "simulate", "--study", "study.toml", folder=work)
     succeed(house, "-c", ANSWERS, folder=work)
     # As it would be published, without what sessions wrote, and without the added task.

@@ -170,18 +170,22 @@ def _rule(plan: PlanSection) -> str:
 
 def proof_of_sensitivity(study: Study, claim: ClaimSection) -> str:
     """What has to show that people tell surfaces apart, before a claim may end in equality."""
-    plan = study.plan_of(claim.task)
-    if claim.task == "relative":
+    plan, table = study.plan_of(claim.task), ANSWER_TABLES[claim.task]
+    advice = ""
+    if claim.measure in table.scales:
+        if plan.anchors:
+            return "No equality unless the anchors are rated lower than the textures' own models."
+        advice = "; give it anchors" * bool(table.other_texture)
+    elif table.has_rates and table.has_chance:
         return f"No equality unless {claim.models[0]} models are recognised above chance."
-    if claim.task == "absolute" and plan.anchors:
-        return "No equality unless the anchors are rated lower than the textures' own models."
-    if plan.catch_trials:
-        sentence = catch_trials_text(study, claim.task)
-        return f"No equality unless the odd one of catch trials is found above chance ({sentence})."
-    advice = {"absolute": "; give it anchors", "oddity": "; give it catch trials"}
-    return (
-        f"No equality in any case, as nothing in it tests sensitivity{advice.get(claim.task, '')}."
-    )
+    elif table.both_models:
+        if plan.catch_trials:
+            trials = catch_trials_text(study, claim.task)
+            return (
+                f"No equality unless the odd one of catch trials is found above chance ({trials})."
+            )
+        advice = "; give it catch trials" * bool(table.other_texture)
+    return f"No equality in any case, as nothing in it tests sensitivity{advice}."
 
 
 def _claimed(claim: ClaimSection) -> str:
