@@ -116,16 +116,6 @@ class Responses:
         return frozenset(same | stated)
 
     @property
-    def absolute(self) -> pd.DataFrame:
-        """Main trials of the absolute evaluation."""
-        return self.answers["absolute"]
-
-    @property
-    def relative(self) -> pd.DataFrame:
-        """Main trials of the seven-alternative forced choice."""
-        return self.answers["relative"]
-
-    @property
     def textures(self) -> tuple[str, ...]:
         """Textures that were asked about, in the order of the answers."""
         asked = (t for table in self.answers.values() for t in table["texture"].dropna())

@@ -48,7 +48,7 @@ def confusion_matrices(
     Parameters
     ----------
     relative : DataFrame
-        `Responses.relative`; trials without an answer are left out.
+        `Responses.answers` of an identification task; trials without an answer are left out.
     models : tuple of str
         Sets of models to count, in this order.
 

@@ -179,7 +179,7 @@ def test_tables_that_differ_from_their_log_are_named_and_only_status_changes_the
     assert f"corrected from the log: data/{name}\n" in status.stdout
     assert "written from the log: 1 new file in data/sub-03/ses-01/beh\n" in status.stdout
     assert contents(data).keys() - before.keys() == {physio}
-    assert read_answers({"": data}, ()).absolute.equals(good.absolute)
+    assert read_answers({"": data}, ()).answers["absolute"].equals(good.answers["absolute"])
 
 
 def test_a_damaged_session_is_named_and_nobody_is_lost_without_a_word(main, data: Path) -> None:
@@ -198,15 +198,17 @@ def test_a_damaged_session_is_named_and_nobody_is_lost_without_a_word(main, data
     assert contents(data) == before
     without = ["sub-03=damaged on the stick"]
     found = read_answers({"": data}, without)
-    wanted = good.absolute[good.absolute["participant_id"] != "sub-03"].reset_index(drop=True)
-    assert found.absolute.equals(wanted)
+    wanted = good.answers["absolute"][
+        good.answers["absolute"]["participant_id"] != "sub-03"
+    ].reset_index(drop=True)
+    assert found.answers["absolute"].equals(wanted)
     assert "sub-03 was left out by hand: damaged on the stick." in found.warnings
     # Nothing of theirs is read that cannot be, and they took part: nobody is missing.
     next(data.glob("sourcedata/sub-03/ses-01/*_manifest.json")).write_text("{")
     for lost in (data / "README", next(data.glob("sub-03/ses-01/beh/*absolute_beh.tsv"))):
         lost.unlink()
         found = read_answers({"": data}, without)
-        assert found.absolute.equals(wanted)
+        assert found.answers["absolute"].equals(wanted)
         assert found.unfinished == ()
 
 

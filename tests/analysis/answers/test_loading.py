@@ -22,13 +22,15 @@ from tests.refusals import refused
 def test_main_trials_and_training_are_kept_apart(study_folder, write_task, absolute_rows):
     write_task("absolute", absolute_rows)
     responses = load_responses(study_folder)
-    assert len(responses.absolute) == 14
-    assert set(responses.absolute["phase"]) == {"main"}
+    assert len(responses.answers["absolute"]) == 14
+    assert set(responses.answers["absolute"]["phase"]) == {"main"}
     assert responses.training["absolute"]["texture"].tolist() == ["canvas"]
-    assert responses.absolute["participant_id"].unique().tolist() == ["sub-01"]
-    assert responses.absolute["magnitude_similarity"].tolist() == [50.0 + n for n in range(1, 15)]
-    assert responses.relative.empty
-    assert "correct" in responses.relative
+    assert responses.answers["absolute"]["participant_id"].unique().tolist() == ["sub-01"]
+    assert responses.answers["absolute"]["magnitude_similarity"].tolist() == [
+        50.0 + n for n in range(1, 15)
+    ]
+    assert responses.answers["relative"].empty
+    assert "correct" in responses.answers["relative"]
     assert not responses.simulated
     assert responses.name == "Seven surfaces"
     assert responses.warnings == ()
@@ -41,15 +43,17 @@ def test_several_participants_and_both_tasks(
         write_task("absolute", absolute_rows, participant=participant)
         write_task("relative", relative_rows, participant=participant)
     responses = load_responses(str(study_folder))
-    assert len(responses.absolute) == 28
-    assert responses.relative["participant_id"].tolist() == ["sub-01"] * 7 + ["sub-02"] * 7
-    assert responses.relative["correct"].sum() == 8
+    assert len(responses.answers["absolute"]) == 28
+    assert (
+        responses.answers["relative"]["participant_id"].tolist() == ["sub-01"] * 7 + ["sub-02"] * 7
+    )
+    assert responses.answers["relative"]["correct"].sum() == 8
 
 
 def test_missing_values_become_nan(study_folder, write_task, absolute_rows):
     absolute_rows[3][6] = "n/a"
     write_task("absolute", absolute_rows)
-    ratings = load_responses(study_folder).absolute["magnitude_similarity"]
+    ratings = load_responses(study_folder).answers["absolute"]["magnitude_similarity"]
     assert math.isnan(ratings[2])
     assert ratings.notna().sum() == 13
 
@@ -59,7 +63,7 @@ def test_a_file_that_was_cut_is_refused(study_folder, write_task, absolute_rows,
     path = write_task("absolute", absolute_rows)
     path.write_bytes(path.read_bytes()[:-kept])
     if kept == 1:  # only the last line end is missing
-        assert len(load_responses(study_folder).absolute) == 14
+        assert len(load_responses(study_folder).answers["absolute"]) == 14
         return
     with pytest.raises(InputError) as caught:
         load_responses(study_folder)
@@ -70,7 +74,7 @@ def test_a_session_without_an_answer_has_none(study_folder, write_task, absolute
     write_task("absolute", absolute_rows)
     write_task("absolute", [], participant="sub-02")
     responses = load_responses(study_folder)
-    assert responses.absolute["participant_id"].unique().tolist() == ["sub-01"]
+    assert responses.answers["absolute"]["participant_id"].unique().tolist() == ["sub-01"]
 
 
 def test_quoted_text_is_read_as_it_was(study_folder, write_task, absolute_rows):
@@ -84,7 +88,7 @@ def test_quoted_text_is_read_as_it_was(study_folder, write_task, absolute_rows):
         for name in ("texture", "virtual_texture"):
             trial[name] = {'"say ""linen"""': 'say "linen"'}.get(trial[name], trial[name])
     manifest.write_text(json.dumps(stored))
-    assert 'say "linen"' in set(load_responses(study_folder).absolute["texture"])
+    assert 'say "linen"' in set(load_responses(study_folder).answers["absolute"]["texture"])
     path.write_text(path.read_text().replace('"say ""linen"""', '"say "linen""'))
     with refused(InputError, expected=["quotes", "line 2", path], got="linen"):
         load_responses(study_folder)
@@ -93,7 +97,7 @@ def test_quoted_text_is_read_as_it_was(study_folder, write_task, absolute_rows):
 def test_windows_line_ends_and_byte_order_mark_are_read(study_folder, write_task, absolute_rows):
     path = write_task("absolute", absolute_rows)
     path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n"))
-    assert len(load_responses(study_folder).absolute) == 14
+    assert len(load_responses(study_folder).answers["absolute"]) == 14
 
 
 @pytest.mark.parametrize(
@@ -217,7 +221,7 @@ def test_a_session_that_ended_early_is_named(study_folder, write_task, write_ord
         "sub-02 relative ses-01 answered 4 of 7 main trials (ended early).",
         "sub-03 relative ses-01 answered 0 of 7 main trials (ended early).",
     )
-    assert len(responses.relative) == 11
+    assert len(responses.answers["relative"]) == 11
 
 
 @pytest.mark.parametrize("with_order", [True, False])
@@ -410,7 +414,7 @@ def test_one_session_under_two_names_is_refused(study_folder, write_task, relati
     _one_sentence(caught.value, twice)
     relative_rows[3][-2] = "21.999"
     write_task("relative", relative_rows, participant="sub-02")
-    assert len(load_responses(study_folder).relative) == 14
+    assert len(load_responses(study_folder).answers["relative"]) == 14
 
 
 def test_claims_come_from_the_study_that_was_run(study_folder, write_task, absolute_rows):
@@ -573,7 +577,7 @@ def test_pilots_are_told(study_folder, write_task, absolute_rows):
     among_others = load_responses(study_folder)
     told = "sub-01 absolute ses-01 was a pilot; its answers are not data of the study"
     assert among_others.warnings == (f"{told} and are left out.",)
-    assert among_others.absolute.empty
+    assert among_others.answers["absolute"].empty
     description = study_folder / "dataset_description.json"
     stated = json.loads(description.read_text())
     description.write_text(json.dumps({**stated, "Pilot": True}))
@@ -581,7 +585,7 @@ def test_pilots_are_told(study_folder, write_task, absolute_rows):
         sidecar.write_text(json.dumps({**json.loads(sidecar.read_text()), "Pilot": True}))
     alone = load_responses(study_folder)
     assert alone.warnings == (f"{told}.",)
-    assert len(alone.absolute) > 0
+    assert len(alone.answers["absolute"]) > 0
 
 
 def test_anchors_stand_apart(study_folder, write_task, absolute_rows):
@@ -597,8 +601,8 @@ def test_anchors_stand_apart(study_folder, write_task, absolute_rows):
     manifest.write_text(json.dumps(stored))
     responses = load_responses(study_folder)
     assert responses.anchors["absolute"]["trial"].tolist() == [5, 7]
-    assert len(responses.absolute) == 12
-    assert not {5, 7} & set(responses.absolute["trial"])
+    assert len(responses.answers["absolute"]) == 12
+    assert not {5, 7} & set(responses.answers["absolute"]["trial"])
     assert set(responses.anchors) == {"absolute", "oddity"}
     assert responses.anchors["oddity"].empty
 
@@ -635,7 +639,7 @@ def test_tasks_without_a_real_surface_are_read(study_folder, write_task, task):
     responses = load_responses(study_folder)
     assert responses.answers[task]["answer"].tolist() == [[1.0] * 3, [2.0] * 3][task == "threshold"]
     assert responses.textures == (() if task == "threshold" else ("canvas",))
-    assert responses.absolute.empty
+    assert responses.answers["absolute"].empty
     rows[1][columns.index("correct")] = "0"
     path = write_task(task, rows, columns=columns)
     right = "interval" if task == "threshold" else "odd_position"
@@ -820,10 +824,10 @@ def test_of_who_is_left_out_nothing_need_be_readable(study_folder, write_task, a
     for participant in ("sub-02", "sub-01"):
         write_task("absolute", absolute_rows, participant=participant)
     paths = sorted(study_folder.glob("sub-01/ses-*/beh/*_beh.tsv"))
-    others = load_responses(study_folder).absolute.query("participant_id != 'sub-01'")
+    others = load_responses(study_folder).answers["absolute"].query("participant_id != 'sub-01'")
     for path in paths:
         path.write_bytes(path.read_bytes().split(b"\n")[0] + b"\n" if left == "header" else b"")
     responses = load_responses(study_folder, leaving_out=["sub-01"])
     found = leave_out(responses, {"sub-01": "a stick that failed"})
-    assert found.absolute.equals(others.reset_index(drop=True))
+    assert found.answers["absolute"].equals(others.reset_index(drop=True))
     assert set(found.left_out["absolute"]["participant_id"]) == {"sub-01"}

@@ -61,7 +61,7 @@ def test_repeats_replace_what_failed_and_what_failed_is_counted(study_folder, wr
         "sub-01 absolute ses-01: 4 of 18 answers left out, since the rig failed in their trials "
         "(3 repeated)."
     )
-    main = responses.absolute
+    main = responses.answers["absolute"]
     assert len(main) == 13
     assert 17 in main["trial"].tolist()
     assert not {4, 8, 18} & set(main["trial"])
@@ -142,8 +142,8 @@ def test_training_may_end_early_and_begin_again(study_folder, resumed):
     responses = load_responses(study_folder)
     assert responses.warnings == ()
     assert responses.training["absolute"]["trial"].tolist() == [1, 7, 8]
-    assert responses.absolute["trial"].tolist() == [3, 4, 5, 6]
-    assert responses.absolute["run"].tolist() == [1, 1, 2, 2]
+    assert responses.answers["absolute"]["trial"].tolist() == [3, 4, 5, 6]
+    assert responses.answers["absolute"]["run"].tolist() == [1, 1, 2, 2]
 
 
 @pytest.mark.parametrize(

@@ -32,12 +32,12 @@ def leipzig(ratings, choices, plan) -> Responses:
 @pytest.fixture
 def nara(leipzig) -> Responses:
     """Others, who rate simplified models 20 points lower throughout, and answer all right."""
-    lower = 20.0 * (leipzig.absolute["model"] == "simplified")
-    rated = leipzig.absolute.assign(
-        magnitude_similarity=leipzig.absolute["magnitude_similarity"] - lower
+    lower = 20.0 * (leipzig.answers["absolute"]["model"] == "simplified")
+    rated = leipzig.answers["absolute"].assign(
+        magnitude_similarity=leipzig.answers["absolute"]["magnitude_similarity"] - lower
     )
     plan = replace(leipzig.plan, sha256=("0b",))
-    chosen = leipzig.relative.assign(correct=1.0)
+    chosen = leipzig.answers["relative"].assign(correct=1.0)
     return replace(leipzig, answers={"absolute": rated, "relative": chosen}, plan=plan)
 
 
@@ -53,8 +53,8 @@ def test_the_surplus_of_one_set_up_fills_no_gap_of_another(leipzig, nara):
 
 def test_people_of_one_number_at_two_set_ups_are_two(leipzig, nara):
     both = pool_setups({"leipzig": leipzig, "nara": nara})
-    assert both.absolute["participant_id"].nunique() == 32
-    assert set(setup_of(both.absolute["participant_id"])) == {"leipzig", "nara"}
+    assert both.answers["absolute"]["participant_id"].nunique() == 32
+    assert set(setup_of(both.answers["absolute"]["participant_id"])) == {"leipzig", "nara"}
     assert both.planned["absolute"] == PlannedTask(32, 32)
     assert both.unfinished == ()
     assert both.warnings == ("leipzig: sub-02 was a pilot.", "nara: sub-02 was a pilot.")

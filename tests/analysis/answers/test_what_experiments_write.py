@@ -86,10 +86,10 @@ def test_every_answer_arrives(responses):
     assert responses.simulated_participants
     assert responses.simulated_rig
     assert responses.warnings == ()
-    assert len(responses.absolute) == 3 * 3 * 2
+    assert len(responses.answers["absolute"]) == 3 * 3 * 2
     assert len(responses.anchors["absolute"]) == 3
     assert set(responses.anchors["absolute"]["virtual_texture"]) == {"PVC"}
-    assert len(responses.relative) == 4 * 3 * 2 * 2
+    assert len(responses.answers["relative"]) == 4 * 3 * 2 * 2
     assert len(responses.answers["oddity"]) == 3 * 2
     caught = responses.anchors["oddity"]
     assert len(caught) == 2
@@ -101,8 +101,8 @@ def test_every_answer_arrives(responses):
     assert (responses.answers["threshold"]["frequency_hz"] > 0).all()
     assert len(responses.training["absolute"]) == 3
     assert len(responses.training["relative"]) == 4 * 2
-    assert set(responses.absolute["texture"]) == set(TEXTURES)
-    assert responses.absolute["magnitude_similarity"].between(0, 100).all()
+    assert set(responses.answers["absolute"]["texture"]) == set(TEXTURES)
+    assert responses.answers["absolute"]["magnitude_similarity"].between(0, 100).all()
 
 
 def test_as_many_trials_are_done_as_were_planned_anchors_and_catch_trials_included(responses):
@@ -133,7 +133,7 @@ def test_no_pair_is_missing(responses):
         assert list(incomplete(one)) == []
         assert (one.tests["n"] == count).all()
         assert one.claim.planned is False  # the study states no claims
-    for matrix in confusion_matrices(responses.relative).values():
+    for matrix in confusion_matrices(responses.answers["relative"]).values():
         assert matrix.counts.sum(axis=1).tolist() == [4 * 2] * 3
 
 

@@ -61,7 +61,7 @@ def test_planned_claims_come_first_and_what_nobody_planned_is_exploratory(answer
     ]
     assert [claim.planned for claim in claims] == [True, False, False]
     assert [claim.bounds for claim in claims[1:]] == [None, None]
-    nobody = replace(answers, answers={"absolute": answers.absolute.iloc[:0]})
+    nobody = replace(answers, answers={"absolute": answers.answers["absolute"].iloc[:0]})
     assert all_claims(nobody) == ()
 
 
@@ -77,10 +77,12 @@ def test_the_planted_difference_is_found_where_it_is(found):
 
 
 def test_any_sets_of_models_are_compared_with_the_first_that_was_planned(answers):
-    third = answers.relative[answers.relative["model"] == "full"].assign(model="AR")
+    third = answers.answers["relative"][answers.answers["relative"]["model"] == "full"].assign(
+        model="AR"
+    )
     three = replace(
         answers,
-        answers={"relative": pd.concat([answers.relative, third])},
+        answers={"relative": pd.concat([answers.answers["relative"], third])},
         planned={"relative": PlannedTask(16, 16, ("simplified", "AR", "full"), 3)},
         plan=AnalysisPlan(claims=()),
     )
@@ -92,10 +94,11 @@ def test_any_sets_of_models_are_compared_with_the_first_that_was_planned(answers
 
 
 def test_who_lacks_one_repeat_is_named(answers):
-    gone = answers.relative[
-        (answers.relative["participant_id"] == "sub-07") & (answers.relative["texture"] == "MDF")
+    gone = answers.answers["relative"][
+        (answers.answers["relative"]["participant_id"] == "sub-07")
+        & (answers.answers["relative"]["texture"] == "MDF")
     ].index[0]
-    cut = replace(answers, answers={"relative": answers.relative.drop(gone)})
+    cut = replace(answers, answers={"relative": answers.answers["relative"].drop(gone)})
     (one,) = claims_found(cut, rng=rng())
     assert list(incomplete(one)) == [("sub-07", "MDF")]
     tests = one.tests.set_index("texture")
@@ -115,7 +118,7 @@ def test_an_unfinished_task_has_no_verdict(answers):
 
 @pytest.mark.parametrize(("lower", "told_apart"), [(30.0, True), (0.0, False)])
 def test_equality_needs_anchors_that_are_told_apart(answers, lower, told_apart):
-    own = answers.absolute[answers.absolute["texture"] == "canvas"]
+    own = answers.answers["absolute"][answers.answers["absolute"]["texture"] == "canvas"]
     noise = rng().normal(0, 6, len(own))
     anchors = own.assign(
         magnitude_similarity=own["magnitude_similarity"] - lower + noise - noise.mean()
@@ -206,8 +209,8 @@ def test_the_report_on_such_a_world_says_nothing_of_equality(world, told, plan):
 def test_equality_of_guesses_is_none(answers):
     """Two models that nobody recognises are equally often right: that says nothing."""
     draws = np.random.default_rng(8)
-    guessed = answers.relative.assign(
-        correct=(draws.random(len(answers.relative)) < 1 / 7).astype(float)
+    guessed = answers.answers["relative"].assign(
+        correct=(draws.random(len(answers.answers["relative"])) < 1 / 7).astype(float)
     )
     blind = replace(answers, answers={"relative": guessed})
     caveats = claim_caveats(blind, answers.plan.claims[2], rng=rng())
@@ -219,7 +222,7 @@ def test_equality_of_guesses_is_none(answers):
 
 
 def test_chance_is_one_over_the_alternatives_that_every_trial_has(answers):
-    of_three = answers.relative.assign(layout="a|b|c")
+    of_three = answers.answers["relative"].assign(layout="a|b|c")
     assert chance_of("relative", of_three) == 1 / 3
     assert np.isnan(chance_of("relative", of_three.assign(layout=np.nan)))
     of_three.loc[of_three.index[0], "layout"] = "a|b"
@@ -228,7 +231,7 @@ def test_chance_is_one_over_the_alternatives_that_every_trial_has(answers):
 
 
 def test_everybody_right_is_above_chance_and_equal(answers):
-    always = replace(answers, answers={"relative": answers.relative.assign(correct=1.0)})
+    always = replace(answers, answers={"relative": answers.answers["relative"].assign(correct=1.0)})
     (one,) = claims_found(always, rng=rng())
     assert one.caveats.sensitivity == SHOWN
     assert set(one.tests["verdict"]) == {EQUIVALENT}
@@ -319,9 +322,11 @@ def test_verdicts_stand_beside_what_was_planted(found):
 
 def test_incomplete_pairs_are_refused_and_named(answers):
     check_complete(answers)
-    gone = answers.relative["participant_id"].isin(["sub-03", "sub-09"])
-    gone &= answers.relative["model"] == "full"
-    cut = replace(answers, answers={**answers.answers, "relative": answers.relative[~gone]})
+    gone = answers.answers["relative"]["participant_id"].isin(["sub-03", "sub-09"])
+    gone &= answers.answers["relative"]["model"] == "full"
+    cut = replace(
+        answers, answers={**answers.answers, "relative": answers.answers["relative"][~gone]}
+    )
     with refused(
         InputError, got=["sub-03", "forced choice", "canvas", "sub-09", "--exclude", "--complete"]
     ):
@@ -371,7 +376,7 @@ def test_the_plan_names_the_rule_that_decides(answers, judged_once):
     assert overall["model_mean"] == pytest.approx(overall["mean_difference"], abs=2.0)
     assert 0 <= overall["share_low"] <= overall["share_outside"] <= overall["share_high"] <= 1
     assert sorted(judged.people.people["participant_id"]) == sorted(
-        answers.absolute["participant_id"].unique()
+        answers.answers["absolute"]["participant_id"].unique()
     )
     textures = judged.tests.set_index("texture")
     assert textures.loc["PVC", "verdict"] == DIFFERENT  # 30 points are planted there
@@ -395,9 +400,9 @@ def test_the_same_seed_gives_the_same_verdicts_of_the_model(answers, judged_once
 
 
 def test_fewer_than_eight_people_are_left_to_the_tests(answers):
-    few = sorted(answers.absolute["participant_id"].unique())[:7]
-    kept = answers.absolute["participant_id"].isin(few)
-    small = replace(by_model(answers), answers={"absolute": answers.absolute[kept]})
+    few = sorted(answers.answers["absolute"]["participant_id"].unique())[:7]
+    kept = answers.answers["absolute"]["participant_id"].isin(few)
+    small = replace(by_model(answers), answers={"absolute": answers.answers["absolute"][kept]})
     (one, *_) = claims_found(small, rng=rng())
     assert one.people is None
     assert set(one.tests["rule"]) == {"tests"}

@@ -157,10 +157,12 @@ def test_every_texture_is_told_with_its_verdict(people):
 
 
 def test_deviations_name_who_was_left_out_and_what_was_not_planned(people, plan):
-    gone = (people.absolute["participant_id"] == "sub-05") & (people.absolute["texture"] == "MDF")
+    gone = (people.answers["absolute"]["participant_id"] == "sub-05") & (
+        people.answers["absolute"]["texture"] == "MDF"
+    )
     cut = replace(
         people,
-        answers={**people.answers, "absolute": people.absolute[~gone]},
+        answers={**people.answers, "absolute": people.answers["absolute"][~gone]},
         plan=replace(plan, claims=plan.claims[:1], sha256=("0a" * 32, "0b" * 32)),
         warnings=("sub-09 relative ses-01 was a pilot.",),
     )

@@ -148,7 +148,7 @@ def test_equality_is_withheld_with_the_reason_and_no_upper_limit_of_people(one):
 
 def test_an_unfinished_task_shows_no_effect_whatever_the_rule(responses):
     begun = replace(responses, planned={"absolute": PlannedTask(24, 24, repeats=1)})
-    begun = replace(begun, answers={"absolute": responses.absolute})
+    begun = replace(begun, answers={"absolute": responses.answers["absolute"]})
     judged = claims_found(begun, rng=np.random.default_rng(1))
     assert {one.tests.iloc[0]["verdict"] for one in judged} == {INTERIM}
     assert all(one.people is None for one in judged)
