@@ -193,7 +193,7 @@ def use_study(path: Path) -> Iterable[object]:
 def use_answers(path: Path) -> Iterable[object]:
     folder = next(parent for parent in path.parents if parent.name == "data")
     responses = load_responses(folder)
-    yield responses.absolute["trial"].to_numpy(float)
+    yield responses.answers["absolute"]["trial"].to_numpy(float)
     yield len(responses.textures)
 
 

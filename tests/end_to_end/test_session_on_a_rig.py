@@ -176,7 +176,7 @@ def test_what_fails_in_a_session_is_in_its_data_and_repeated(answered: tuple[Pat
     assert set(answers["simulated"].astype(str)) == {"True"}  # the hand is scripted
     responses = load_responses(study / "data")  # refuses any other order of repeats
     assert f"{len(failed)} of {len(answers)} answers left out" in responses.warnings[0]
-    assert not set(responses.absolute["trial"]) & failed
+    assert not set(responses.answers["absolute"]["trial"]) & failed
     check_log(read_log(Path(f"{stem}_log.jsonl")).events, failed)
     check_traces(
         pd.read_csv(f"{stem}_hand.tsv", sep="\t"),
