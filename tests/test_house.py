@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import pkgutil
 import re
+import subprocess
 from importlib import import_module
 from pathlib import Path
 
@@ -146,3 +147,32 @@ def test_a_public_class_and_an_imported_constant_stand_for_one_thing() -> None:
                         given.setdefault(one.name, {})[node.module] = own[one.name]
     assert len(given) > 200
     assert {name: homes for name, homes in given.items() if len(set(homes.values())) > 1} == {}
+
+
+def test_every_folder_has_its_sentence_and_no_other_has_one() -> None:
+    page = (ROOT / "docs/where.md").read_text("utf-8")
+    rows = re.findall(r"^\| `([a-z_/]+)` \| (.+) \|$", page, flags=re.MULTILINE)
+    assert all(len(sentence.split()) > 2 for _, sentence in rows)
+    listed = subprocess.run(
+        ["git", "ls-files", "-co", "--exclude-standard", *ROOMS],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    folders = {Path(file).parent.as_posix() for file in listed.stdout.splitlines()}
+    assert sorted(folder.rstrip("/") for folder, _ in rows) == sorted(folders)
+
+
+def test_the_roads_lead_through_modules_that_exist() -> None:
+    """Of each road every file, in its order, and the next one is not far from it."""
+    text = (ROOT / "ARCHITECTURE.md").read_text("utf-8")
+    roads = re.findall(
+        r"^## The road of (.+?)\n(.+?)(?=^## )", text, flags=re.MULTILINE | re.DOTALL
+    )
+    assert [name for name, _ in roads] == ["a recording", "a hand's reading", "an answer"]
+    for _, road in roads:
+        files = re.findall(r"`([\w/]+\.(?:py|h))`", road)
+        assert len(files) > 10
+        assert [file for file in files if not (ROOT / file).is_file()] == []
+    assert len(text.split()) < 1000  # two pages
