@@ -53,7 +53,6 @@ def bootstrap_covers(rates: Floats, truth: float, rng: np.random.Generator) -> B
     ----------
     rates : (k, n) ndarray
         Of k studies with n participants.
-    truth : float
     rng : Generator
         Draws the resamples.
     """

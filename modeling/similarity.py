@@ -146,7 +146,6 @@ def reports(
     ----------
     measured : Spectrum
         At the rate of the filters.
-    filters : iterable of PEQ or ARFilter
     rng : Generator, optional
         As in `report`.
     """
@@ -160,7 +159,6 @@ class Target:
 
     Parameters
     ----------
-    measured : Spectrum
     truths : tuple of (n,) ndarray
         Its smoothed magnitudes in the compared band, in the order of `SIGMAS_HZ`.
     floors, expected : tuple of float

@@ -35,7 +35,6 @@ class RigReading:
         Normal force, ≥ 0; 0 off the surface.
     button : bool
         Whether the button was pressed since the last reading.
-    simulated : bool
     """
 
     time_s: float
@@ -71,7 +70,6 @@ class PreparedSignal:
     Parameters
     ----------
     samples_g : (n,) ndarray
-    rate_hz : float
     vibrator_sha256 : str, optional
         SHA-256 of the vibrator's file for which it is compensated; None for the vibration itself.
     simulated : bool
@@ -93,7 +91,6 @@ class Stimulus(PreparedSignal):
 
     Parameters
     ----------
-    texture : str
     sha256 : str
         Of the file.
     model_sha256 : str
@@ -198,7 +195,6 @@ class PresentationRecord:
     number : int
         From 1, since the rig was opened.
     surface : {"real", "virtual"}
-    texture : str
     model_sha256 : str
         Of the model that was rendered, or of the stimulus's file; empty for a real surface.
     start_s, end_s : float
@@ -211,7 +207,6 @@ class PresentationRecord:
         Duration of the vibration that was played, silence under a resting hand included.
     dose_g2_s : float
         Its square (g²) over time, unweighted.
-    peak_g : float
     misses : int
         Blocks that the card had to do without.
     stale_blocks : int
@@ -247,7 +242,6 @@ class Acceleration:
     ----------
     start_s : float
         When the first sample was measured, on the rig's clock.
-    rate_hz : float
     samples_g : (n,) ndarray
     """
 

@@ -44,7 +44,6 @@ class Finding:
 
     Parameters
     ----------
-    name : str
     told : str
         What it is; where it is a fault or a note, what to do.
     state : {"ok", "note", "fault"}

@@ -60,7 +60,6 @@ class _Made:
 
     Parameters
     ----------
-    outcome : TextureOutcome
     files : mapping of str to bytes
         By the ending of their names.
     provenance : mapping
@@ -78,7 +77,6 @@ class HowToModel:
 
     Parameters
     ----------
-    estimator : str
     layers : int, optional
         Their number; chosen without it.
     keep_hum, check, alone, plot : bool
@@ -107,7 +105,6 @@ def model_textures(
         Recording sets, or folders of them.
     out : Path
         Where the files go; a texture's are written once it is modelled.
-    how : HowToModel
     jobs : int, optional
         Textures at a time, in processes of their own; as many as there are cores without it. The
         files do not depend on it.

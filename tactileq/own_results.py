@@ -55,7 +55,6 @@ def check_own_files(
     note : Path
         Their provenance beside them: an existing file may be replaced if this names the same
         command and texture and lists the file.
-    command : str
     texture : str, optional
         What the files are about.
     inputs : iterable of Path

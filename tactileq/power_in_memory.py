@@ -40,9 +40,6 @@ class SimulatedStudy:
     ----------
     study : Study
         With as many participants as the largest n.
-    models : ModelSets
-    perception : Perception
-    psychometrics : Psychometrics
     """
 
     study: Study
@@ -148,10 +145,8 @@ def chances(
 
     Parameters
     ----------
-    people : SimulatedStudy
     sizes : sequence of int
         Numbers of participants, none above those of the study.
-    simulations : int
     seed : int
         ≥ 0.
     jobs : int, optional

@@ -67,7 +67,6 @@ class ImportedAnswers:
     answers : DataFrame
         participant_id, a column per factor (text), presented and answered where known, `measure`
         (correct 0–1, or value in the table's own unit) and count (trials that the row stands for).
-    factors : tuple of str
     measure : str
         correct or value.
     classes : tuple of str
@@ -161,7 +160,6 @@ def load_imported(files: Sequence[str | Path], mapping: TableMap) -> ImportedAns
     files : sequence of str or Path
         Text in UTF-8, with or without a byte order mark; columns are separated by commas,
         semicolons (then numbers may have a decimal comma) or tabs.
-    mapping : TableMap
 
     Raises
     ------

@@ -46,7 +46,6 @@ class AnalysisPlan:
 
     Parameters
     ----------
-    claims : tuple of Claim
     exclusions : tuple of str
         One sentence for each reason to leave somebody or something out.
     highest_share_at_ends : float

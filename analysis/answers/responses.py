@@ -21,7 +21,6 @@ class PlannedTask:
 
     Parameters
     ----------
-    participants : int
     sessions : int
         Of all participants.
     models : tuple of str
@@ -176,7 +175,6 @@ def leave_out(responses: Responses, reasons: Mapping[str, str]) -> Responses:
 
     Parameters
     ----------
-    responses : Responses
     reasons : mapping of participant to reason
         Participants as in the data, such as sub-05.
 
@@ -226,7 +224,6 @@ def stands_apart(table: pd.DataFrame, task: str) -> pd.Series:
     ----------
     table : DataFrame
         Answers to the task, with the column texture.
-    task : str
 
     Returns
     -------

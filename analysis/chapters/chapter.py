@@ -34,7 +34,6 @@ class Answered:
 
     Parameters
     ----------
-    responses : Responses
     found : sequence of ClaimFound
         Every claim about a task that was begun.
     rng : Generator
@@ -122,7 +121,6 @@ class Stream:
 
     Parameters
     ----------
-    task : str
     ending : str
         Of the names of its files: empty of the first task that is declared with what the chapter
         is about, so that a name stands for the same in every study.

@@ -43,7 +43,6 @@ def plot_paired_bars(found: ClaimFound, *, simulated: bool, ax: Axes | None = No
         A participant's two means are joined by a line.
     simulated : bool
         Written into the figure.
-    ax : Axes, optional
     """
     ax = axes_or_new(ax)
     tests = found.tests[found.tests["texture"] != ALL_TEXTURES]

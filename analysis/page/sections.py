@@ -18,7 +18,6 @@ class Section:
 
     Parameters
     ----------
-    anchor, heading : str
     items : tuple of Table, Picture or Fold
         In the order of the page.
     outcomes : tuple of Outcome
@@ -57,7 +56,6 @@ def of_task(section: Section, ending: str) -> Section:
 
     Parameters
     ----------
-    section : Section
     ending : str
         Such as `_pair`.
     """

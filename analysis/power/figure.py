@@ -110,7 +110,6 @@ def plot_power(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     ----------
     table : DataFrame
         As for `figure_power`, of one claim.
-    ax : Axes, optional
     """
     ax = axes_or_new(ax)
     lines = {

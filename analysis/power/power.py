@@ -175,7 +175,6 @@ def people_verdicts(
     ----------
     claim : Claim
         With bounds.
-    judged : PeopleJudged
     n : int
         Participants of the study, for the record.
     shares : mapping of texture to float
@@ -216,8 +215,6 @@ def verdicts(
 
     Parameters
     ----------
-    claim : Claim
-    values : Values
     n : int
         Participants of the study, for the record.
     caveats : Caveats
@@ -276,7 +273,6 @@ def power_table(found: Iterable[Verdict], *, simulations: int) -> pd.DataFrame:
     ----------
     found : iterable of Verdict
         Of all simulations, in any order but with the same claims, textures and n in each.
-    simulations : int
 
     Returns
     -------

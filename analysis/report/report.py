@@ -93,7 +93,6 @@ def write_report(
         What was made elsewhere: results on methods rather than this study, chapters on a table.
     provenance : mapping of str to object, optional
         Versions, configuration, hashes of inputs; nested values are flattened.
-    title : str
     hand : DataFrame, optional
         How the hand moved with either model (`analysis.answers.hand.load_hand`).
     planted : mapping of texture to mapping of measure to points, optional

@@ -45,7 +45,6 @@ class SpectrumComparison:
 
     Parameters
     ----------
-    texture : str
     speed_mm_s, force_n : float
         The condition.
     simulated : bool
@@ -101,7 +100,6 @@ def compare_spectra(
 
     Parameters
     ----------
-    result : TextureResult
     speed_mm_s, force_n : float
         A recorded condition.
 
@@ -132,7 +130,6 @@ def compare_condition(
 
     Parameters
     ----------
-    full : TextureModel
     simplification : Simplification
         Of `full`.
     speed_mm_s, force_n : float
@@ -232,7 +229,6 @@ class SpectrumPanel:
         Texture and condition.
     unit : str
         g, or arbitrary.
-    simulated : bool
     frequency_hz, magnitude : (n,) ndarray
         Smoothed magnitude (σ = 30 Hz) in `unit` per unit noise.
     layer_frequency_hz, layer_height : (m,) ndarray

@@ -27,7 +27,6 @@ class ContactSheet:
 
     Parameters
     ----------
-    name : str
     textures, trajectories, models : tuple of str
         In the manifest's order.
     frequency_hz : (n,) ndarray

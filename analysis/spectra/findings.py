@@ -43,7 +43,6 @@ class Findings:
 
     Parameters
     ----------
-    texture, estimator : str
     measured : sequence of (Recording, Spectrum)
         Each recording with contact and its spectrum.
     alone : tuple of RecordingLayers
@@ -123,7 +122,6 @@ def findings_files(found: Findings, *, plot: bool) -> dict[str, bytes]:
 
     Parameters
     ----------
-    found : Findings
     plot : bool
         Also draw spectra of conditions in all parts of the grid, and the layers over the grid.
 

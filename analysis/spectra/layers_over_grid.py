@@ -32,9 +32,6 @@ class LayersOverSpeed:
     ----------
     label : str
         Whose layers these are.
-    texture : str
-    force_n : float
-    simulated : bool
     unit : str
         Of the amplitudes: g, or arbitrary.
     speeds_mm_s : (S,) ndarray
@@ -74,8 +71,6 @@ class LayersOverGrid:
 
     Parameters
     ----------
-    texture, estimator : str
-    simulated : bool
     unit : str
         Of the amplitudes: g, or arbitrary.
     speeds_mm_s : (S,) ndarray

@@ -26,7 +26,6 @@ class CompensatedVibrator:
 
     Parameters
     ----------
-    vibrator : Vibrator
     compensation : Compensation
         For the vibrator as it was identified.
     before_db, after_db : (n,) ndarray
@@ -63,7 +62,6 @@ def compensated(
 
     Parameters
     ----------
-    vibrator : Vibrator
     mistunings : sequence of float
         Shares of the frequency by which the notch is off, such as −0.1 for 10 % below.
 

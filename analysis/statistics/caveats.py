@@ -98,7 +98,6 @@ class Caveats:
 
         Parameters
         ----------
-        word : str
         share_at_ends : float
             As for `doubt`.
         """

@@ -127,9 +127,6 @@ def claim_tests(
 
     Parameters
     ----------
-    claim : Claim
-    values : Values
-    caveats : Caveats
     rng : Generator
         Draws sign flips.
 
@@ -202,10 +199,8 @@ def with_people(
     ----------
     tests : DataFrame
         From `claim_tests`.
-    found : PeopleFound
     claim : Claim
         With bounds.
-    caveats : Caveats
     few : float
         Of the plan.
 
@@ -266,13 +261,11 @@ def words_of_people(
 
     Parameters
     ----------
-    found : PeopleJudged
     bounds : (float, float)
     textures : sequence of str
         Those that are compared. Their posterior probabilities are corrected after Holm.
     shares : mapping of texture to float
         As `Values.share_at_ends`.
-    caveats : Caveats
     few : float
         Of the plan.
     """
@@ -384,7 +377,6 @@ def complete_means(
     ----------
     table : DataFrame
         participant_id, texture, model and `column`; one row per answer.
-    column : str
     models : (str, str)
         The reference, and the other one.
     repeats : int
@@ -418,7 +410,6 @@ def share_at_ends(
     ----------
     table : DataFrame
         texture and `column`; one row per answer.
-    column : str
     identical : collection of str
         Textures that are not compared.
     ends : (float, float)

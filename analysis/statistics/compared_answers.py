@@ -145,7 +145,6 @@ def chance_of(task: str, answers: pd.DataFrame) -> float:
 
     Parameters
     ----------
-    task : str
     answers : DataFrame
         Of the task.
 

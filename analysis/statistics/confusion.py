@@ -78,7 +78,6 @@ def participant_counts(
     ----------
     relative : DataFrame
         That the matrix was counted from.
-    matrix : ConfusionMatrix
 
     Returns
     -------

@@ -78,7 +78,6 @@ def planted_verdicts(
 
     Parameters
     ----------
-    found : sequence of ClaimFound
     planted : mapping of texture to mapping of measure to points
         Other − reference. Measures without planted differences are left out.
 

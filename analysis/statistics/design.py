@@ -78,7 +78,6 @@ def design(answers: pd.DataFrame, column: str, *, models: tuple[str, str]) -> De
     answers : DataFrame
         participant_id, texture, model and `column` (NaN where not answered), one row per trial in
         the order of the trials; session where there are several.
-    column : str
     models : (str, str)
         The reference, and the other one. Textures on which nobody answered with one of them are
         left out.
@@ -127,7 +126,6 @@ def complete_participants(
     ----------
     answers : DataFrame
         As in `design`.
-    column : str
     models : (str, str)
 
     Returns

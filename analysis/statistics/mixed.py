@@ -165,7 +165,6 @@ def mixed_effects(
     ----------
     answers : DataFrame
         As in `analysis.statistics.design.design`, textures with identical models left out.
-    column : str
     models : (str, str)
         The reference, and the other one.
     rng : Generator
@@ -207,7 +206,6 @@ def t_of(estimate: float, error: float, *, n: int) -> dict[str, float]:
 
     Parameters
     ----------
-    estimate, error : float
     n : int
         Participants, ≥ 2.
     """

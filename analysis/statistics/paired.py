@@ -151,7 +151,6 @@ def participant_means(table: pd.DataFrame, column: str) -> pd.DataFrame:
     ----------
     table : DataFrame
         Columns participant_id, texture, model and `column`.
-    column : str
 
     Returns
     -------
@@ -220,7 +219,6 @@ def sign_flips_p(
     Parameters
     ----------
     differences : (n,) ndarray
-    rng : Generator
     alternative : {"two-sided", "greater", "less"}
     """
     if differences.size < 2:

@@ -48,12 +48,10 @@ class ClaimFound:
 
     Parameters
     ----------
-    claim : Claim
     tests : DataFrame
         `analysis.statistics.claims.claim_tests`; without rows where nobody answered.
     values : DataFrame
         texture, participant_id, reference, other.
-    caveats : Caveats
     people : PeopleFound, optional
         Where the model of the participants decides.
     few : float
@@ -73,7 +71,6 @@ def claims_found(responses: Responses, *, rng: np.random.Generator) -> list[Clai
 
     Parameters
     ----------
-    responses : Responses
     rng : Generator
         Draws sign flips.
 
@@ -112,8 +109,6 @@ def claim_people(
 
     Parameters
     ----------
-    responses : Responses
-    claim : Claim
     rng : Generator
         Seeds the draws from the posterior.
     """

@@ -65,7 +65,6 @@ def distances_to_truth(
     ----------
     filter_at : callable
         `model.peq` of a texture model, `model.filter` of an AR model or a field of spectra.
-    truth : Truth
     conditions : iterable of (speed, force)
     frequency_hz : (n,) ndarray
         Evenly spaced; over them powers are summed and logarithms compared, unsmoothed.
@@ -87,7 +86,6 @@ def distances_to_recordings(filter_at: FilterAt, measured: Measured) -> pd.DataF
 
     Parameters
     ----------
-    filter_at : callable
     measured : sequence of (Recording, Spectrum)
         From `fitting.conditions.recording_spectra`; repeats of a condition are averaged, silent
         recordings left out.
@@ -251,7 +249,6 @@ def worth_recording(left_out: pd.DataFrame, *, most: int = 3) -> list[Condition]
     ----------
     left_out : DataFrame
         From `left_out_table`.
-    most : int
     """
     if not len(left_out):
         return []

@@ -40,7 +40,6 @@ def comparisons(
 
     Parameters
     ----------
-    results : sequence of TextureResult
     rng : Generator
         Of the draws behind the expected GFCs: each texture has a stream of its own, so that its
         numbers do not depend on how the work is divided.

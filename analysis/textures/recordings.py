@@ -45,10 +45,6 @@ def layers_of_recordings(
 def layers_table(found: Sequence[RecordingLayers]) -> pd.DataFrame:
     """The layers of each recording: one row per layer, or one with `layer` 0 where none is.
 
-    Parameters
-    ----------
-    found : sequence of RecordingLayers
-
     Returns
     -------
     DataFrame

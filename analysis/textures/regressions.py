@@ -357,8 +357,6 @@ class CentroidOverSpeed:
 
     Parameters
     ----------
-    texture : str
-    simulated : bool
     speeds_mm_s : (S,) ndarray
     mean_hz, sd_hz : (S,) ndarray
         Over the forces of recorded conditions; NaN where there is none, the SD where fewer than
@@ -438,7 +436,6 @@ def driven_table(full: TextureModel, targets: Sequence[ConditionTarget]) -> pd.D
 
     Parameters
     ----------
-    full : TextureModel
     targets : sequence of ConditionTarget
         What all three are compared with.
 

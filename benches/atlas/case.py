@@ -43,7 +43,6 @@ class Axis:
         Ends of the range, in either order; above 0 on a logarithmic axis.
     default : float, optional
         The default of the program or its typical use; None where there is no such value.
-    logarithmic : bool
     """
 
     name: str
@@ -110,7 +109,6 @@ class Case:
         From a column's value to the edge (on the axis) from which the method should no longer
         hold; at or beyond the severe end where it should hold throughout, NaN where no formula
         says. `source` says which formula that is.
-    source : str
     exception : str
         Why the default may be within a factor of 2 of the nearest edge; "" where it may not.
     """

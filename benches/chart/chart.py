@@ -38,8 +38,6 @@ class Chart:
         From `summary.front_table`.
     comparisons : tuple of RivalComparison
         Our default against every rival.
-    warnings : tuple of str
-    machine : str
     """
 
     rows: pd.DataFrame
@@ -60,7 +58,6 @@ def chart_of(judged: Sequence[Judged], *, turns: int = TURNS) -> Chart:
 
     Parameters
     ----------
-    judged : sequence of Judged
     turns : int
         Of timing.
 

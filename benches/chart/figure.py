@@ -130,8 +130,6 @@ def plot_panel(summary: pd.DataFrame, panel: Panel, ax: Axes | None = None) -> A
     ----------
     summary : DataFrame
         Rows of one kind of `summary.summarised`.
-    panel : Panel
-    ax : Axes, optional
     """
     ax = axes_or_new(ax)
     error = f"{panel.place}_distance_db"

@@ -37,7 +37,6 @@ class Filtered:
 
     Parameters
     ----------
-    model : CoefficientTable or BandTable
     conditions : int
         Whose filters are stored; the table between them is made of these beforehand.
     """

@@ -71,7 +71,6 @@ class ShapedNoise:
     speeds_mm_s, forces_n : (S,), (F,) ndarray
     magnitudes : (S, F, n/2 + 1) ndarray
         At the lines of a block of n samples, in g per unit noise.
-    rate_hz : float
     """
 
     speeds_mm_s: Floats

@@ -187,7 +187,6 @@ class RivalComparison:
         The rival's over ours, by the names of `_COMPARED`: costs, and distances from the truth.
     worst_db : (rival's, ours)
         Distance between the conditions on the worst surface.
-    surfaces : int
     dominated_by, dominates_by : mapping of place to Dominating
         Between the conditions and during strokes, where one method dominates the other: each of
         its variants is dominated by a variant of the other. Of those that dominate the default

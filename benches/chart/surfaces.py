@@ -111,7 +111,6 @@ class Material:
         Of the spectra.
     prepare_s : float
         Processor time that the spectra took.
-    simulated : bool
     warnings : tuple of str
         What could not be used.
     """

@@ -36,11 +36,6 @@ def time_table(streams: Mapping[Key, Turn], *, turns: int = TURNS) -> pd.DataFra
     In every turn each stream renders a few thousand samples; the first turns warm up. So whatever
     slows the machine down for a while slows all of them.
 
-    Parameters
-    ----------
-    streams : mapping of Key to Turn
-    turns : int
-
     Returns
     -------
     DataFrame

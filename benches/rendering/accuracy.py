@@ -65,7 +65,6 @@ def speed_errors(hand: Hand, readings: Hand, *, plan: RenderPlan) -> SpeedErrors
         As it is, at each of n samples.
     readings : Hand
         What a device would read at each of them; those at the plan's updates are used.
-    plan : RenderPlan
 
     Notes
     -----

@@ -48,7 +48,6 @@ class PoleZeroFilter:
         a₁ … a_p and b₁ … b_q.
     gain : float
         In g per unit noise.
-    rate_hz : float
     """
 
     poles: Floats
@@ -90,7 +89,6 @@ class SecondOrderBands:
         g.
     first, second, gains : (m,) ndarray
         a₁, a₂ and b of the bands.
-    rate_hz : float
     """
 
     noise_gain: float
@@ -146,7 +144,6 @@ class CoefficientTable:
         Gain, a₁ … a_p, b₁ … b_q.
     poles : int
         p, 4 … 40.
-    rate_hz : float
 
     Raises
     ------
@@ -213,7 +210,6 @@ class BandTable:
         Rising, above 0, two or more each.
     values : (S, F, 1 + 3m) ndarray
         Noise gain, then a₁ of all bands, a₂ of all, and b of all (`SecondOrderBands`).
-    rate_hz : float
     """
 
     speeds_mm_s: Floats
@@ -295,8 +291,6 @@ def tabled(
         Speeds and forces.
     values : (S, F, 1 + p + q) ndarray
         Gain, line spectral frequencies of the denominator, and of the numerator.
-    poles : int
-    rate_hz : float
 
     Raises
     ------

@@ -85,7 +85,6 @@ def plot_costs(
         Column to colour, in the order of the bars.
     logarithmic : bool
         Where costs differ by orders of magnitude; by default the axis begins at 0.
-    ax : Axes, optional
     """
     ax = axes_or_new(ax)
     groups, width = np.arange(len(rows)), _BARS_SHARE / len(colours)

@@ -126,7 +126,6 @@ class CompiledStream:
     model : LayeredModel
         At most 40 layers, rendered at its own rate (the kernel: at any); a `CoefficientTable` for
         `AR` and `COEFFICIENTS`, a `BandTable` for `BANDS`.
-    update_samples : int
     seed : int
         Of the noise.
     rate_hz : float, optional
@@ -197,7 +196,6 @@ class SoundStream:
     ----------
     sounds : Loops or Grains
         Grains have a hand of their own interval, half a block.
-    update_samples : int
     seed : int
         Of the places from which grains are taken; loops always start at their beginning.
     """

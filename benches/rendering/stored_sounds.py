@@ -45,7 +45,6 @@ class Sounds:
     samples : (S, F, N) ndarray of int16
     scales : (S, F) ndarray
         What a sound's samples are multiplied by, in g (or the recordings' unit).
-    rate_hz : float
     """
 
     speeds_mm_s: Floats
@@ -121,7 +120,6 @@ def make_loops(
     ----------
     axes : (S,), (F,) ndarray
         Speeds (mm/s) and forces (N) of the nodes.
-    magnitude : Magnitude
     rate_hz, seconds : float
         Of a loop.
     rng : numpy.random.Generator

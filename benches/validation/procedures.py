@@ -268,7 +268,6 @@ class Check:
 
     Parameters
     ----------
-    procedure, quantity : str
     hits : callable
         Of drawn values (k, n, …), the truth and a generator: (k,) whether it covered, or rejected.
     nominal : callable

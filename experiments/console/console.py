@@ -34,7 +34,6 @@ class Console:
         What every page is marked with, such as "pilot, simulated rig"; empty for none.
     size : (int, int)
         Window in pixels, at least 4:3.
-    fullscreen : bool
     screen : int
         Which screen, from 0.
     on_page : callable, optional

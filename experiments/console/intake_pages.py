@@ -141,13 +141,7 @@ def _level(runner: PageRunner, question: Question) -> str:
 
 
 class _Typed:
-    """The digits typed so far, in a frame; above them what may be typed, orange where it is not.
-
-    Parameters
-    ----------
-    runner : PageRunner
-    least, most : float
-    """
+    """The digits typed so far, in a frame; above them what may be typed, orange where it is not."""
 
     def __init__(self, runner: PageRunner, *, least: float, most: float) -> None:
         from psychopy import visual

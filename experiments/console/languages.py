@@ -29,7 +29,6 @@ class Texts:
 
     Parameters
     ----------
-    language : str
     by_key : mapping of key to text
         Keys have dots ("absolute.main.title"); texts have {places} for values.
     """

@@ -38,7 +38,6 @@ class PageRunner(PageParts):
     Parameters
     ----------
     window : psychopy.visual.Window
-    texts : Texts
     stamp : str
         What every page is stamped with, in the participant's language.
     on_page : callable, optional

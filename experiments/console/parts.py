@@ -35,7 +35,6 @@ class PageParts:
     Parameters
     ----------
     window : psychopy.visual.Window
-    texts : Texts
 
     Attributes
     ----------

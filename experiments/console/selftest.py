@@ -31,7 +31,6 @@ class Timing:
 
     Parameters
     ----------
-    name, meaning : str
     milliseconds : (n,) sequence of float
         n ≥ 1 measurements.
     limit_ms : float

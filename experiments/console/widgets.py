@@ -85,10 +85,8 @@ class Button:
     window : psychopy.visual.Window
     name : str
         By which tests find it.
-    label : str
     at, size : (x, y)
         Middle, and width and height.
-    action : callable
     color : str
         Of the button while it is lit.
     height : float

@@ -26,8 +26,6 @@ class LiveRig:
 
     Parameters
     ----------
-    live : Live
-    hand : HandReader
     sound : SoundOutput, optional
         Without it nothing is played.
     pointed : bool

@@ -16,7 +16,6 @@ class HandNow:
     ----------
     speed_mm_s : float
         Tangential speed; its sign is the direction.
-    force_n : float
     there : bool
         Whether a reading came within the last 100 ms; else the rig counts the hand as lifted off.
     force_assumed : bool

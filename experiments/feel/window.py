@@ -72,12 +72,10 @@ class FeelWindow:
 
     Parameters
     ----------
-    visit : Visit
     yardstick : FeltCriterion
         By which a layer counts as felt.
     size : (int, int)
         Window in pixels, at least 4:3.
-    fullscreen : bool
     screen : int
         Which screen, from 0; InputError where there is none.
     on_frame : callable, optional

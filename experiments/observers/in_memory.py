@@ -75,11 +75,8 @@ def simulate_sessions(
 
     Parameters
     ----------
-    study : Study
-    models : ModelSets
     perception : Perception
         Of this study and these models.
-    psychometrics : Psychometrics
     seed : int
         ≥ 0; of the participants and their answers.
     subjects : iterable of int, optional

@@ -44,7 +44,6 @@ def sensation_levels(
     ----------
     model : TextureModel, RegressedModel, ARModel or Stimulus
         In g; a stimulus is felt alike in every stroke.
-    threshold : Threshold
     strokes : tuple of (speed in mm/s, force in N)
 
     Returns
@@ -156,7 +155,6 @@ class Perception:
 
     Parameters
     ----------
-    study : Study
     real : mapping of str to TextureModel
         The truth behind each real surface.
     models : ModelSets

@@ -32,7 +32,6 @@ class Trait:
 
     Parameters
     ----------
-    mean : float
     sd : float
         Standard deviation between people, ≥ 0.
     """
@@ -52,7 +51,6 @@ class SimulatedPerson:
 
     Parameters
     ----------
-    threshold_db, sensitivity, magnitude_bias, frequency_bias, lapse_rate, learning, care : float
     preferences : tuple of float
         Of the buttons, log odds.
     careless : bool

@@ -42,7 +42,6 @@ class SimulatedParticipant:
 
     Parameters
     ----------
-    perception : Perception
     psychometrics : Psychometrics
         The population that the participant is drawn from.
     seed : int

@@ -45,7 +45,6 @@ def simulate_study(
         The truth behind each real surface.
     models : ModelSets
         What the virtual surfaces present.
-    rig : TextureRig
     data_folder : path
         Root of a new data set.
     seed : int

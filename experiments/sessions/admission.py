@@ -29,8 +29,6 @@ def admit(files: SessionFiles, manifest: SessionManifest, *, overrides: Override
 
     Parameters
     ----------
-    files : SessionFiles
-    manifest : SessionManifest
     overrides : Overrides
         Takes what goes on against a rule.
 

@@ -20,7 +20,6 @@ class Agenda:
         Empty where training is over.
     training_again : bool
         Whether it was over before, and comes again after a long break.
-    main : tuple of Trial
     owed : tuple of Trial
         Those in which the rig failed and that were not repeated yet.
     next_number : int

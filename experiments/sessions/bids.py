@@ -84,10 +84,6 @@ def export_session(data_folder: str | Path, manifest_path: str | Path) -> None:
 def export_all(data_folder: str | Path) -> Exported:
     """Write the BIDS tables of every session that is not running, where they differ.
 
-    Parameters
-    ----------
-    data_folder : path
-
     Returns
     -------
     Exported
@@ -130,7 +126,6 @@ def require_tables(
 
     Parameters
     ----------
-    data_folder : path
     task, subject : str, int, optional
         Which sessions are to be read; all, and the tables about people, without them.
     without : collection of str

@@ -29,7 +29,6 @@ def claim_data_set(root: Path, manifest: SessionManifest, *, overrides: Override
     ----------
     root : Path
         Made if it is not there.
-    manifest : SessionManifest
     overrides : Overrides
         Another study or other models, and pilot data beside others, are against the rules.
 

@@ -25,7 +25,6 @@ class SessionFiles:
     ----------
     root : Path
         Of the data set.
-    task : str
     subject, session : int
         From 1.
     """

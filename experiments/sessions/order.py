@@ -27,8 +27,6 @@ def draw_session(study: Study, task: Task, *, subject: int, session: int, slot: 
 
     Parameters
     ----------
-    study : Study
-    task : Task
     subject : int
         1 … 9999; the shuffles follow from it.
     session : int

@@ -106,7 +106,6 @@ class Intake:
         The participant's pseudonym.
     known : bool
         Whether this person was here before: then only the code is confirmed.
-    questions : tuple of Question
     """
 
     consent: str
@@ -162,7 +161,6 @@ class ProgressReport:
 
     Parameters
     ----------
-    phase : str
     done, of : int
         Main trials.
     minutes_left : float, optional

@@ -61,7 +61,6 @@ def resumption(
 
     Parameters
     ----------
-    manifest : SessionManifest
     state : SessionState
         Before the run that begins now.
     longest_gap_min : float

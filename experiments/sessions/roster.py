@@ -100,7 +100,6 @@ class Roster:
             ≥ 1; without it the lowest number that has not been used.
         participants : int
             How many slots the task's design has.
-        simulated, pilot : bool
 
         Yields
         ------

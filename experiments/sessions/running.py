@@ -80,8 +80,6 @@ def run_session(
 
     Parameters
     ----------
-    task : Task
-    study : Study
     subject, session : int
         From 1; with the study's seed they fix the order of the trials.
     models : ModelSets
@@ -93,7 +91,6 @@ def run_session(
         Who answers, and who mounts the samples.
     data_folder : path
         Root of the data set.
-    circumstances : Circumstances, optional
 
     Returns
     -------

@@ -155,7 +155,6 @@ class SessionStore:
 
         Parameters
         ----------
-        data_folder : path
         manifest : SessionManifest
             As it would be made now. The one on disk, with its order, stays in force; what is
             different now is logged.

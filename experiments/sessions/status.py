@@ -26,8 +26,6 @@ class SessionProgress:
 
     Parameters
     ----------
-    task : str
-    session : int
     status : {"running", "complete", "aborted", "crashed", "damaged"}
         Damaged where its manifest or log cannot be read, so that nothing else is known.
     answered, planned : int
@@ -47,7 +45,6 @@ class PersonProgress:
 
     Parameters
     ----------
-    subject, slot : int
     code : str
         Pseudonym; empty of somebody who withdrew.
     left : {"", "dropped", "withdrawn"}
@@ -80,8 +77,6 @@ class StudyProgress:
 
     Parameters
     ----------
-    people : tuple of PersonProgress
-    tasks : tuple of TaskProgress
     damaged : tuple of str
         What cannot be read of the roster.
     """

@@ -61,7 +61,6 @@ class Store(Protocol):
         Parameters
         ----------
         status : {"complete", "aborted", "crashed"}
-        reason : str
         by : str
             Who or what ended it, such as "participant", "experimenter" or "signal".
 

@@ -34,7 +34,6 @@ def outside_grid(rows: HandRows, records: Sequence[PresentationRecord]) -> Outsi
 
     Parameters
     ----------
-    rows : HandRows
     records : sequence of PresentationRecord
         Those that count; each has the grid of its model.
 

@@ -31,7 +31,6 @@ class Surfaces:
 
     Parameters
     ----------
-    rig : TextureRig
     texture : str
         The real surface.
     models : sequence of TextureModel, RegressedModel, ARModel, Stimulus or ToneBurst

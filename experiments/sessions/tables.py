@@ -27,7 +27,6 @@ class GrowingTable:
     ----------
     path : Path
         Where a table is there, as another run of the session left it, rows follow its whole ones.
-    columns : sequence of Column
 
     Raises
     ------

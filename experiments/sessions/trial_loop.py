@@ -69,9 +69,6 @@ def run_trials(
 
     Parameters
     ----------
-    plan : SessionPlan
-    task : Task
-    models : ModelSets
     rig : TextureRig
         Opened already.
     people : People

@@ -26,7 +26,6 @@ def withdraw(data_folder: str | Path, subject: int) -> Exported:
     ----------
     data_folder : path
         Root of the data set.
-    subject : int
 
     Returns
     -------
@@ -62,11 +61,6 @@ def withdraw(data_folder: str | Path, subject: int) -> Exported:
 
 def drop_out(data_folder: str | Path, subject: int) -> Exported:
     """Record that a person dropped out: the data stay, the slot becomes free.
-
-    Parameters
-    ----------
-    data_folder : path
-    subject : int
 
     Returns
     -------

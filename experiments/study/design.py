@@ -94,8 +94,6 @@ class Occasion:
 
     Parameters
     ----------
-    study : Study
-    task : str
     subject : int
         1 … 9999; with the seed, the task and the session all shuffles follow from it.
     slot : int

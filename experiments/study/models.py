@@ -128,7 +128,6 @@ class ModelSets:
 
         Parameters
         ----------
-        study : Study
         allow : callable
             Called with what may be overridden ("exchanged models") and the error against it.
 
@@ -196,7 +195,6 @@ def load_model_sets(
 
     Parameters
     ----------
-    study : Study
     folder : path
         What the study's paths are relative to: the folder of its file.
     overriding : mapping of set to path, optional

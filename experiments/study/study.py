@@ -291,7 +291,6 @@ def plan_sha256(study: Study, models_sha256: Mapping[str, Mapping[str, str]]) ->
 
     Parameters
     ----------
-    study : Study
     models_sha256 : mapping of texture to mapping of set to SHA-256
         As `ModelSets.sha256` gives them.
     """

@@ -135,7 +135,6 @@ def with_catch_trials(plan: TaskPlan, *, rule: str, anchors: Mapping[str, str]) 
 
     Parameters
     ----------
-    plan : TaskPlan
     rule : {"tests", "model"}
         Of the study's verdicts; under "model" there are catch trials unless the plan says no.
     anchors : mapping of texture to texture

@@ -30,8 +30,6 @@ def plan_session(
 
     Parameters
     ----------
-    study : Study
-    task : str
     subject, session : int
         From 1.
     slot : int, optional

@@ -18,7 +18,6 @@ class Balance:
 
     Parameters
     ----------
-    task : str
     what : str
         What is counted.
     least, most : int

@@ -29,7 +29,6 @@ def plan_page(study: Study, models: ModelSets) -> str:
 
     Parameters
     ----------
-    study : Study
     models : ModelSets
         With a model of each texture in each set.
 

@@ -44,7 +44,6 @@ class ThresholdTrial(Trial):
     ----------
     trial, phase, texture, model, tray
         As in `Trial`; texture and model are "n/a".
-    frequency_hz : float
     interval : int
         That of the tone, 1 or 2: the right answer.
     amplitude_g, highest_g : float, optional

@@ -47,10 +47,8 @@ class Answer:
 
     Parameters
     ----------
-    frequency_hz : float
     level_db : float
         One of `LEVELS_DB`.
-    correct : bool
     highest_db : float
         The highest level that the rig could present.
     """
@@ -67,14 +65,12 @@ class Estimate:
 
     Parameters
     ----------
-    frequency_hz : float
     level_db : float
         Posterior mean, dB re 1 g (peak).
     sd_db : float
         Posterior standard deviation.
     slope, lapse_rate : float
         Posterior means, of all frequencies; the slope is Weibull's, over amplitudes.
-    trials : int
     beyond : {"", "above", "below"}
         Whether the threshold is more likely than not above the highest level that the rig can
         present, or below the lowest that is asked; `level_db` is then that level, a bound.
@@ -152,7 +148,6 @@ def posterior(answers: Sequence[Answer], frequency_hz: float) -> Floats:
     ----------
     answers : sequence of Answer
         Of one person, at any frequencies.
-    frequency_hz : float
     """
     logs = _log_weights([a for a in answers if a.frequency_hz == frequency_hz])
     axis = _quest_plus().prior.get_axis_num("threshold")
@@ -210,7 +205,6 @@ def estimate(answers: Sequence[Answer], frequency_hz: float) -> Estimate:
     ----------
     answers : sequence of Answer
         Of one person, at any frequencies.
-    frequency_hz : float
 
     Raises
     ------

@@ -58,7 +58,6 @@ class ThresholdAnswers:
         Where it was read.
     estimates : mapping of participant to their thresholds
         Of each frequency with an answer.
-    simulated : bool
     """
 
     files: tuple[Path, ...]
@@ -80,7 +79,6 @@ class MeanThreshold:
         95 %: of one person mean ± 1.96 SD, else Student's; None where a threshold is only a bound.
     slope, lapse_rate : float
         Means.
-    trials, people : int
     note : str
         Where somebody's threshold lay beyond what was presented.
     """
@@ -104,7 +102,6 @@ def read_answers(data_folder: str | Path, *, subject: int | None = None) -> Thre
 
     Parameters
     ----------
-    data_folder : path
     subject : int, optional
         Everybody without it. Pilots are left out.
 

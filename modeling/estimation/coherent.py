@@ -54,7 +54,6 @@ class Observed:
         As in `Bins`, one row per spectrum; rows with fewer bins end in some without weight.
     line_hz : (K,) ndarray
         Width of a spectral line, see `LINE_WIDTH`; 0 where the truth itself is looked at.
-    rate_hz : float
     """
 
     power: Floats
@@ -180,7 +179,6 @@ def response(theta: Floats, signs: Floats | None, observed: Observed) -> Respons
     signs : (K, m) or (m,) ndarray, optional
         1 or −1. Without them the layers are independent: each has a noise of its own, and their
         powers add.
-    observed : Observed
 
     Notes
     -----

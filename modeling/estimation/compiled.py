@@ -38,7 +38,6 @@ class CompiledSpectra:
     line_hz : (K,) ndarray
     rate_hz, highest_hz : float
         Layers above `highest_hz` are looked at there.
-    costs : Costs
     """
 
     def __init__(

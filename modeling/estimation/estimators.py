@@ -15,7 +15,6 @@ def find_layers(spectrum: Spectrum, *, estimator: str = "joint") -> Layers:
 
     Parameters
     ----------
-    spectrum : Spectrum
     estimator : {"joint", "paper", "paper-consistent"}
     """
     if check_estimator(estimator) == "joint":

@@ -31,7 +31,6 @@ def fit_layer_count(spectrum: Spectrum, count: int) -> PEQ:
 
     Parameters
     ----------
-    spectrum : Spectrum
     count : int
         m ≥ 1.
 

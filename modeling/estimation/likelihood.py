@@ -47,7 +47,6 @@ class Power:
     weight : (n,) ndarray
         What a line counts. Where the sensor's floor has left the share q of a line's power, the
         relative error of the rest is 1/q times as large, so the line counts q².
-    rate_hz, step_hz : float
     records : float
         How many records it is the mean of.
     """
@@ -111,7 +110,6 @@ def signal_power(spectrum: Spectrum, *, empty_below_db: float = EMPTY_BELOW_DB) 
 
     Parameters
     ----------
-    spectrum : Spectrum
     empty_below_db : float
         Instead of −50 dB; −inf for the whole band.
     """

@@ -75,7 +75,6 @@ def fit_layers(
 
     Parameters
     ----------
-    spectrum : Spectrum
     frequencies_hz : (m,) ndarray
     fallback_bandwidths_hz : (m,) ndarray
         Taken where the width's fit fails; NaN where there is none (then the smoothing's own).

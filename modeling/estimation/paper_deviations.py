@@ -37,7 +37,6 @@ def smoothed_level_sd_db(
 
     Parameters
     ----------
-    spectrum : Spectrum
     heights : (n,) ndarray
         The smoothed spectrum, in g per unit noise, less the floor where one is subtracted (whose
         own error, from many more bins, is left out).

@@ -45,7 +45,6 @@ class Peaks:
 
     Parameters
     ----------
-    noise_gain : float
     frequencies_hz, bandwidths_hz, gains : (m,) ndarray
         Gains, relative to `Power.scale`, are those of the peaks' own power.
     shape : float

@@ -49,7 +49,6 @@ class AnswerTable:
     ----------
     title : str
         The task in words that can stand after "the", such as "forced choice".
-    columns : tuple of AnswerColumn
     of_surfaces : bool
         Whether every trial has a texture and a model; else nothing compares models.
     both_models : bool

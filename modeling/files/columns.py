@@ -29,7 +29,6 @@ class Column:
 
     Parameters
     ----------
-    name : str
     label : str
         The heading without the unit; where empty, the name in words.
     unit : str
@@ -122,10 +121,8 @@ class Column:
 
         Parameters
         ----------
-        cell : str
         where : str
             Line and file, for the message.
-        advice : str
 
         Raises
         ------

@@ -70,7 +70,6 @@ def key(
     ----------
     description : str
         Its meaning, for documentation and schema.
-    unit : str
     expected : str
         What is expected, where type, limits and unit do not say it well.
     advice : str

@@ -38,7 +38,6 @@ def read_json_object(path: Path, *, advice: str, what: str = "a JSON file") -> d
 
     Parameters
     ----------
-    path : Path
     advice : str
         What to do about a file that holds none; the end of the message.
     what : str

@@ -85,7 +85,6 @@ def replace_folder(path: str | Path, seen: Contents | None = None) -> Iterator[P
 
     Parameters
     ----------
-    path : str or Path
     seen : dict, optional
         `contents_of` the folder when it was found to be one that may be replaced; without it, that
         is now.

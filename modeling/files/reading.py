@@ -32,7 +32,6 @@ def check_file(path: Path, what: str, *, advice: str = "give its path") -> None:
 
     Parameters
     ----------
-    path : Path
     what : str
         What is expected there, with its article, such as "a recipe".
     advice : str

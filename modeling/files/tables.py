@@ -46,7 +46,6 @@ def table_text(
 
     Parameters
     ----------
-    columns : sequence of Column
     rows : iterable of mapping
         The values by column; `guarded`.
     missing : str
@@ -86,7 +85,6 @@ def read_table(
 
     Parameters
     ----------
-    path : str or Path
     columns : sequence of Column
         An optional one that the table does not have is None in each row.
     what : str
@@ -213,10 +211,8 @@ def csv_cells(line: str, where: str, *, delimiter: str = ",") -> list[str]:
 
     Parameters
     ----------
-    line : str
     where : str
         Which line, for the message.
-    delimiter : str
 
     Raises
     ------

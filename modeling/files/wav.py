@@ -26,7 +26,6 @@ def read_wav(path: Path, *, channel: int | None = None) -> tuple[Floats, float]:
 
     Parameters
     ----------
-    path : Path
     channel : int, optional
         Which one, from 1; may be left out where there is only one.
 

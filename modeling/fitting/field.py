@@ -193,7 +193,6 @@ def fit_field(
         One sign per layer for the whole texture; without them layers are independent.
     observed : Observed
         One row per record; rows without any have no weight.
-    field : Field
     limits : pair of (p,) ndarray
     steps, enough
         As in `coherent.climb`.

@@ -56,7 +56,6 @@ class FieldFilter:
         Of the bands.
     magnitude : (B,) ndarray
         In g per unit noise at `rate_hz`.
-    rate_hz : float
     """
 
     frequency_hz: Floats

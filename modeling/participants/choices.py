@@ -264,9 +264,6 @@ class DrawnChoices:
 
     Parameters
     ----------
-    studies : ChoiceStudies
-    people : StudyPeople
-    mixture : EffectMixture
     level, person_sd : (B,) ndarray
         Mean and SD of people's abilities.
     careless : (B, n) ndarray of bool
@@ -295,11 +292,9 @@ def drawn_choices(
 
     Parameters
     ----------
-    model : DecisionModel
     priors : ChoicePriors
         `asked`, `catch_asked` and `trends` as in `ChoiceStudies`.
     asked, catch_asked, trends : ndarray
-    rng : Generator
     """
     studies, people, textures, models = asked.shape
     mixture = drawn_mixture(priors.effects, studies, rng=rng)

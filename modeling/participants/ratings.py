@@ -140,8 +140,6 @@ class DrawnRatings:
 
     Parameters
     ----------
-    studies : RatingStudies
-    mixture : EffectMixture
     effects : (B, n) ndarray
         Of each person, if they attend.
     careless : (B, n) ndarray of bool
@@ -174,12 +172,10 @@ def drawn_ratings(
 
     Parameters
     ----------
-    priors : RatingPriors
     trends : (C, B, n, T, 2, R) ndarray
         The design.
     anchors : int
         A ≥ 0.
-    rng : Generator
     """
     studies, people, textures, _, _ = trends.shape[1:]
     few, each = (studies, people), (studies, people, textures)

@@ -16,13 +16,10 @@ class Decision(NamedTuple):
 
     Parameters
     ----------
-    kept : bool
-    reason : str
     distances_db : (C,) ndarray
         Of what decides to the threshold; NaN where it is not known.
     assumed : (C,) ndarray of bool
         Where the threshold's last level was held as a lower bound.
-    flip_probability : float
     """
 
     kept: bool

@@ -84,7 +84,6 @@ class Recorded:
     ----------
     at : Parameters
         Of the full model there.
-    changes : PowerChanges
     level_sd_db : (n, m) ndarray
     beyond : bool
         Whether some of them are beyond the places that are judged. What is felt there says
@@ -124,10 +123,8 @@ class Judge:
         Of the full model at the n places that are judged.
     changes : PowerChanges
         At the same places.
-    recorded : Recorded
     signs : SignsOfRest
         Of the full model.
-    margin_db : float
     """
 
     def __init__(
@@ -192,7 +189,6 @@ class SetsOfLayers:
 
     Parameters
     ----------
-    judge : Judge
     groups : sequence of sequences of int
         Layers that go together or not at all.
     """

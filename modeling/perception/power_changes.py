@@ -78,7 +78,6 @@ class PowerChanges:
         Of the full model at n places, in g.
     rate_hz : float
         Of the model.
-    threshold : Threshold
     hold_above : bool
         Whether its last level is held above its table, as a lower bound.
     band_hz : (float, float), optional

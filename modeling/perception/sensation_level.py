@@ -36,8 +36,6 @@ def sensation_level(vibration_g: Floats, rate_hz: float, *, threshold: Threshold
     ----------
     vibration_g : (n,) ndarray
         n ≥ 1, in g.
-    rate_hz : float
-    threshold : Threshold
 
     Raises
     ------

@@ -32,7 +32,6 @@ class SignsOfRest:
     ----------
     at : Parameters
         Of the full model at n places.
-    rate_hz : float
     estimator : str
         What made the model.
     """

@@ -68,7 +68,6 @@ def simplify(
     ----------
     model : TextureModel
         In g.
-    threshold : Threshold
     criterion : {"energy", "paper-fft", "paper-gain"}
     margin_db : float
         ≥ 0; how far below the threshold a change or an amplitude has to be.

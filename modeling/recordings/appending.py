@@ -39,7 +39,6 @@ class WavSource:
 
     Parameters
     ----------
-    path : Path
     channel : int
         From 1.
     g_per_fullscale : float, optional
@@ -129,8 +128,6 @@ def staged(
 
     Parameters
     ----------
-    folder : str or Path
-    recordings : RecordingSet
     sources : sequence of WavSource or None
         For each recording the file to copy into the set, or None: then it becomes a CSV file.
 

@@ -189,7 +189,6 @@ class RecordingSet:
 
         Parameters
         ----------
-        folder : str or Path
         texture : str, optional
             The only texture whose files are read; all of them without it.
 

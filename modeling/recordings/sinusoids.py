@@ -59,7 +59,6 @@ def find_sinusoids(samples: Floats, rate_hz: float, *, lowest_hz: float) -> Sinu
     Parameters
     ----------
     samples : (n,) ndarray
-    rate_hz : float
     lowest_hz : float
         None is looked for below.
     """
@@ -103,7 +102,6 @@ def common_hum(
     ----------
     records : sequence of (n,) ndarray
         Prepared, at one rate.
-    rate_hz : float
     speeds_mm_s : sequence of float
         Of each record; those without contact have one of their own, such as 0.
     """

@@ -33,7 +33,6 @@ class Spectrum:
     magnitude : (n,) ndarray
         |FFT| divided by the mean |FFT| of unit white noise of the same length, √(πN)/2: white noise
         of RMS r has a magnitude of mean r, whatever the record's length.
-    rate_hz : float
     n_samples : int
         N, the number of samples behind it.
     averaged : float
@@ -90,7 +89,6 @@ def prepare(recording: Recording, *, rate_hz: float = MODEL_RATE_HZ) -> Floats:
 
     Parameters
     ----------
-    recording : Recording
     rate_hz : float
         Target rate; data of a lower rate keep their own.
 

@@ -42,7 +42,6 @@ class Trajectory:
 
     Parameters
     ----------
-    name : str
     time_s : (n,) array_like
         Finite and rising, over at most an hour; it may begin anywhere.
     speed_mm_s, force_n : (n,) array_like

@@ -31,7 +31,6 @@ def regressed(model: TextureModel, *, by: DrivenBy = "conditions") -> RegressedM
 
     Parameters
     ----------
-    model : TextureModel
     by : {"conditions", "centroid"}
         What drives every parameter: speed, force and their product, by the reduced models of
         eq. 3; or the spectral centroid's response to speed alone, from which all layers are

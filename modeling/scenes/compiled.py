@@ -33,7 +33,6 @@ class Measured:
     Parameters
     ----------
     measure : {"gfc30", "bands_db", "level_db"}
-    bound : float
     mean : float
         With the hand at rest at each place, weighted by its time there; of dB the RMS.
     worst : float
@@ -58,7 +57,6 @@ class Step:
 
     Parameters
     ----------
-    step : str
     layers, numbers, bytes : int
         Of tables and a state.
     operations : float
@@ -104,8 +102,6 @@ class CompiledTexture:
     full_plan, plan : RenderPlan
         How the full and the least model are rendered: by default every millisecond in double
         precision; and as the compiler chose.
-    measures : tuple of Measured
-    steps : tuple of Step
     refused : Alternative, optional
         The next longer update interval; None where there is none.
     """

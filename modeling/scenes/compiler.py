@@ -30,7 +30,6 @@ def compile_scene(
 
     Parameters
     ----------
-    scene : Scene
     models : mapping of str to TextureModel
         Full models by the name of their texture, in g; those that the scene does not name are not
         used.

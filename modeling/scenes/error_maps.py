@@ -38,7 +38,6 @@ class ErrorMaps:
     ----------
     model : TextureModel
         What is felt of the full model.
-    yardstick : ComparedBand
     """
 
     def __init__(self, model: TextureModel, yardstick: ComparedBand) -> None:

@@ -32,9 +32,6 @@ def kept_layers(
 
     Parameters
     ----------
-    model : TextureModel
-    scene : Scene
-    places : Places
     groups : sequence of sequences of int
         Layers that go together or not at all (`own_peaks(model).groups`).
     signs : SignsOfRest

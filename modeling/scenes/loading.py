@@ -21,7 +21,6 @@ def full_models(
 
     Parameters
     ----------
-    scene : Scene
     folder : path, optional
         By default the one that the scene names.
 

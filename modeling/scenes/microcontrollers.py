@@ -48,7 +48,6 @@ class MicroController:
 
     Parameters
     ----------
-    name : str
     core : str
         Its processor, with a floating-point unit.
     clock_hz : float

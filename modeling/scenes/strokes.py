@@ -43,7 +43,6 @@ def windows_kept(
 
     Parameters
     ----------
-    compiled : CompiledTexture
     scene : Scene
         The one that it was compiled for.
     count : int

@@ -35,10 +35,8 @@ def fewest_nodes(
 
     Parameters
     ----------
-    maps : ErrorMaps
     places : Places
         Where the bound counts.
-    bound : Bound
     taken : Errors
         What of it is taken already at each node, (P,).
     below : int

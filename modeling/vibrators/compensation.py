@@ -110,7 +110,6 @@ def compensation_for(vibrator: Vibrator, *, rate_hz: float | None = None) -> Com
 
     Parameters
     ----------
-    vibrator : Vibrator
     rate_hz : float, optional
         At which the compensation is to run; the vibrator's without it.
 

@@ -55,7 +55,6 @@ def identify_vibrator(
     drive, acceleration : (n,) array_like
         Recorded together, 8.25 s at least, in any units; longer where the resonance is narrow.
         Rates above 5 kHz are resampled.
-    rate_hz : float
     simulated : bool
         Whether no real vibrator was tested.
 

@@ -35,7 +35,6 @@ class Aligned:
         From the beginning of the recording to that of the played signal in it.
     drift : float
         Share by which the recording's clock runs faster than the player's.
-    rate_hz : float
     """
 
     played: Floats

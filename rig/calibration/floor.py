@@ -60,7 +60,6 @@ def no_contact_floor(samples_g: ArrayLike, *, rate_hz: float) -> Floor:
     ----------
     samples_g : (n,) array_like
         2 s at least, in g.
-    rate_hz : float
 
     Raises
     ------

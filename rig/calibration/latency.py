@@ -51,7 +51,6 @@ def onset_s(rest: ArrayLike, searched: ArrayLike, *, rate_hz: float) -> float | 
         Before the hand moves, high-passed.
     searched : (n,) array_like
         From the hand's step on, until it ends; likewise.
-    rate_hz : float
 
     Returns
     -------
@@ -136,7 +135,6 @@ class LatencySummary:
 
     Parameters
     ----------
-    median_ms, p95_ms : float
     median_within_ms, p95_within_ms : (low, high)
     trials : int
         Those in which a vibration was found.
@@ -233,7 +231,6 @@ def parts_of(reading_times_s: ArrayLike, blocks: np.ndarray, *, rate_hz: float) 
     reading_times_s : (m,) array_like
         Of the hand's readings, rising.
     blocks : (n,) array of rig.live.memory.BLOCK
-    rate_hz : float
 
     Returns
     -------

@@ -51,7 +51,6 @@ def band_gain(
     ----------
     drive, acceleration : (n,) array_like
         Recorded together or aligned, without clipping.
-    rate_hz : float
     band_hz : (low, high)
 
     Raises
@@ -136,7 +135,6 @@ class MeasuredLevel:
         Interval of the mean, 95 % (Student's t of the logarithms).
     spread_db : float
         Standard deviation of the placements.
-    placements : int
     """
 
     gain: float

@@ -41,7 +41,6 @@ class Record:
     samples_g : (n,) ndarray
     time_s : float
         Of the first sample, by `now_s`.
-    rate_hz : float
     """
 
     samples_g: Floats

@@ -23,7 +23,6 @@ def noise_signal(
 
     Parameters
     ----------
-    duration_s, rate_hz : float
     rms_g : float
         Between the fades; peaks beyond 5 times as much are cut.
     band_hz : (low, high)

@@ -16,7 +16,6 @@ class Coverage:
 
     Parameters
     ----------
-    grid : StrokeGrid
     wanted_s : float
         Of each cell, > 0.
     seconds : mapping of (speed, force) to float

@@ -87,7 +87,6 @@ class StrokeCutter:
 
     Parameters
     ----------
-    grid : StrokeGrid
     rate_hz : float
         Of the acceleration.
     g_per_fullscale : float
@@ -287,8 +286,6 @@ def cut_strokes(
         Shares of full scale without a gap, and when each was measured.
     readings : (m,) ndarray of READING
         The hand, in order of time, on the same clock.
-    grid : StrokeGrid
-    rate_hz : float
     g_per_fullscale : float
         Acceleration of a sample of 1, > 0.
     longest_s, speed_delay_s : float

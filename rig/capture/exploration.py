@@ -109,7 +109,6 @@ def grid_for(exploration: Exploration, *, speeds: int = 7, forces: int = 7) -> S
 
     Parameters
     ----------
-    exploration : Exploration
     speeds, forces : int
         Numbers of steps, 1 to 50.
 

@@ -94,10 +94,6 @@ class InputBlock:
 class AudioInput:
     """A stream from a sound card, through PortAudio; open it, or use it in a `with` block.
 
-    Parameters
-    ----------
-    settings : InputSettings
-
     Raises
     ------
     InputError

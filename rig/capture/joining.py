@@ -25,7 +25,6 @@ def joined(pieces: Sequence[Floats], rate_hz: float) -> Floats:
     ----------
     pieces : sequence of (n,) ndarray
         One at least, each of mean about 0 and of at least 40 ms (two fades).
-    rate_hz : float
 
     Returns
     -------

@@ -85,9 +85,6 @@ class Plan:
 
     Parameters
     ----------
-    texture : str
-    grid : StrokeGrid
-    rate_hz : float
     wanted_s : float
         Of each condition, at least twice the shortest piece (0.2 s).
     repeat : int
@@ -138,7 +135,6 @@ class PieceStore:
     ----------
     folder : str or Path
         A new one, one that was filled so before, or another recording set.
-    plan : Plan
     provenance : mapping
         Of this run; it goes beside the recordings.
 

@@ -75,7 +75,6 @@ class StrokeRecorder:
 
     Parameters
     ----------
-    source : AccelerationSource
     readings : callable
         Gives the readings of the hand since its last call.
     store : PieceStore

@@ -40,7 +40,6 @@ def check_rig(
 
     Parameters
     ----------
-    rig : RigFile
     requirements : Requirements, optional
         Without them only the latency is checked.
     today : date

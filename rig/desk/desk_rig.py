@@ -67,7 +67,6 @@ class DeskRig:
 
     Parameters
     ----------
-    rig_file : RigFile
     requirements : Requirements, optional
         Those of the study; without them neither calibration nor force are checked.
     override : str, optional

@@ -24,9 +24,6 @@ class Played:
 
     Parameters
     ----------
-    frames : int
-    square_sum_g2 : float
-    peak_g : float
     misses, stale : int
         Blocks.
     end_s : float
@@ -66,7 +63,6 @@ class Journal:
 
     Parameters
     ----------
-    live : Live
     opened_s : float
         Zero of the rig's clock, by `now_s`.
     rate_hz : float

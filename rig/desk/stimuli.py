@@ -32,8 +32,6 @@ def check_made_for(rig: RigFile, signal: PreparedSignal, which: str) -> None:
 
     Parameters
     ----------
-    rig : RigFile
-    signal : PreparedSignal
     which : str
         What to call it.
 

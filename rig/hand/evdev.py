@@ -116,7 +116,6 @@ class EventDevice:
     ----------
     handle : int
         File descriptor, which this closes.
-    name : str
     hand : HandOfFrames
         Makes samples of its frames.
     """

@@ -41,7 +41,6 @@ class Frame(NamedTuple):
     ----------
     time_s : float
         By the clock that the device was set to use.
-    events : tuple of Event
     dropped : bool
         The kernel had to throw events away: what the device is like has to be queried again.
     """
@@ -175,12 +174,7 @@ class PenHand:
 
 
 class MouseHand:
-    """A mouse: its counts summed since it was opened; it always touches.
-
-    Parameters
-    ----------
-    counts_per_mm : float
-    """
+    """A mouse: its counts summed since it was opened; it always touches."""
 
     def __init__(self, counts_per_mm: float) -> None:
         self._per_mm = counts_per_mm

@@ -38,7 +38,6 @@ class Follower:
 
     Parameters
     ----------
-    settings : HandSettings
     rest_s : float
         A device that has been silent for this long rests (`Device.rest_s`).
     """

@@ -28,8 +28,6 @@ class HandLoop:
 
     Parameters
     ----------
-    live : Live
-    settings : HandSettings
     send : callable
         Takes what the parent should know.
     opening : callable

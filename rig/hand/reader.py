@@ -126,7 +126,6 @@ class HandReader:
             Pixels; `counts_per_mm` of them are 1 mm.
         down : bool
             Whether it touches.
-        button : bool
         """
         if self._window is None:
             raise InputError(

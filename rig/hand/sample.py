@@ -43,8 +43,6 @@ class ConnectedDevice:
 
     Parameters
     ----------
-    path : str
-    name : str
     kind : str
         "tablet", "mouse", "serial" or "other".
     readable : bool

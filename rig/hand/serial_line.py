@@ -33,7 +33,6 @@ class SensorLine(NamedTuple):
         Position x, y (µm) or signed speed (µm/s): two numbers or one, within ±(2³¹ − 1).
     force_mn : int or None
         Within ±(2³¹ − 1); None where the sensor measures none.
-    contact, button : bool
     """
 
     number: int

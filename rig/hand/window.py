@@ -18,12 +18,7 @@ _MOST_PUSHED = 10_000
 
 
 class PointerDevice:
-    """The pointer of a window as a device: what is pushed at one end is read at the other.
-
-    Parameters
-    ----------
-    pixels_per_mm : float
-    """
+    """The pointer of a window as a device: what is pushed at one end is read at the other."""
 
     name = "pointer of the window"
     firmware = ""
@@ -62,7 +57,6 @@ class WindowHand:
 
     Parameters
     ----------
-    live : Live
     settings : HandSettings
         Of kind "window".
     """

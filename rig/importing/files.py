@@ -59,7 +59,6 @@ def import_wav(
 
     Parameters
     ----------
-    paths : sequence of Path
     labels : sequence of Label
         One per path; their own `g_per_fullscale` and `channel` win.
     g_per_fullscale : float, optional
@@ -117,7 +116,6 @@ def import_csv(
 
     Parameters
     ----------
-    paths : sequence of Path
     labels : sequence of Label
         One per path.
     axis : {"x", "y", "z", "dft321"}, optional

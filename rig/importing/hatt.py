@@ -63,7 +63,6 @@ class HattTexture:
 
     Parameters
     ----------
-    material : str
     rate_hz : float
         The rate at which the filters run.
     conditions : (n, 2) ndarray

@@ -50,7 +50,6 @@ class ToolkitGrid:
 
     Parameters
     ----------
-    speeds, forces : GridAxis
     inside : int
         Number of nodes within the hull of the file's triangles, and with vibration.
     """
@@ -86,7 +85,6 @@ def spanning_grid(
 
     Parameters
     ----------
-    texture : HattTexture
     speeds_mm_s, forces_n : sequence of float, optional
         An axis to take as it is, > 0; by default 7 values over the file's range, or one where all
         filters have the same.

@@ -61,7 +61,6 @@ def doubts_about(
 
     Parameters
     ----------
-    recording : Recording
     name : str
         Of its file, for the sentence.
     unit : {"g", "mg", "m/s2", "arbitrary"}

@@ -40,7 +40,6 @@ class Unevenness(NamedTuple):
         RMS, and at most.
     share : float
         Of the power of a vibration at `highest_hz` that becomes noise in samples taken as even.
-    highest_hz : float
     """
 
     rms_s: float

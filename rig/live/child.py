@@ -63,7 +63,6 @@ class Child:
 
     Parameters
     ----------
-    module : str
     settings : object
         What it gets first: a frozen type that msgspec knows.
     """

@@ -75,7 +75,6 @@ class Monitor:
 
     Parameters
     ----------
-    live : Live
     rate_hz : float
         Of the card.
     peak_g : float

@@ -15,7 +15,6 @@ def with_values(text: str, values: Mapping[str, object]) -> str:
 
     Parameters
     ----------
-    text : str
     values : mapping
         From "section.key" to a Figure, a Curve, text, number, bool, date or list of texts. What is
         missing is added at the end of its section, a missing section at the end.

@@ -96,7 +96,6 @@ class RigFile(DescribedFile):
 
         Parameters
         ----------
-        path : path
         values : mapping
             From "section.key" to a Figure, a Curve, text, number, bool, date or list of texts.
 

@@ -19,7 +19,6 @@ class SimulatedCard:
 
     Parameters
     ----------
-    vibrator : SimulatedTransducers, optional
     name : str
         By which PortAudio lists it.
     """

@@ -105,7 +105,6 @@ class SimulatedAccelerometer:
 
     Parameters
     ----------
-    vibrator : SimulatedTransducers
     rate_hz : float
         Of both signals.
 

@@ -22,8 +22,6 @@ class SoundDevice:
 
     Parameters
     ----------
-    index : int
-    name : str
     host : str
         Which sound system it belongs to.
     inputs, outputs : int

@@ -81,7 +81,6 @@ class SoundOutput:
         At least the models' rate.
     block : int
         Samples between two calls of the callback, 16 … 4096; the hand is held for as long.
-    channels : int
     vibration_channel, masking_channel : int
         From 0; no masking where None.
     fullscale_per_g : float

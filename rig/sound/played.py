@@ -24,7 +24,6 @@ class PlayedBlocks:
 
     Parameters
     ----------
-    live : Live
     limits : Limits
         Of the vibration; its pause and its silence.
     block_s : float

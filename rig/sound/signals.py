@@ -44,7 +44,6 @@ def tone_burst(
         Of the sinusoid, ≥ 0; its RMS is 0.707 of it.
     duration_s : float
         Ramps included; at least two samples, at most 60.
-    rate_hz : float
 
     Raises
     ------

@@ -48,8 +48,6 @@ class SoundProcess:
 
     Parameters
     ----------
-    settings : SoundSettings
-    played : PlayedBlocks
     block_s : float
         Duration of a block.
     """

@@ -57,10 +57,8 @@ def write_c_header(
     ----------
     path : path
         The header; there whole or not at all.
-    model : TextureModel or RegressedModel
     rate_hz : float, optional
         Output rate, from the model's (the default) to 768 000 Hz.
-    seed : int
     single : bool
         Single precision: tables as the nearest floats, and TQ_REAL is float unless the program
         defines it otherwise.

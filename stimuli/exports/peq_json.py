@@ -44,7 +44,6 @@ def write_peq_json(
     ----------
     path : path
         The file; there whole or not at all.
-    model : TextureModel or RegressedModel
     speed_mm_s, force_n : float, optional
         One condition, interpolated as in rendering: at least 0 and not above the grid, where the
         renderer would stay at the edge. Without both, every condition of the model's grid (of a

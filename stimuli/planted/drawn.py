@@ -35,7 +35,6 @@ class DrawnSurface:
 
     Parameters
     ----------
-    name : str
     coefficients : (6, 6) ndarray
         Of each score (columns) on 1, a, b, a·b, a² and b², where a = ln(v/150 mm/s) and
         b = ln(F/1.5 N).

@@ -39,7 +39,6 @@ class PlantedLayer:
     ----------
     frequency_hz : float
         Grows as (v/200)^speed_law; a law of 1 is a spatial wavelength of 200/frequency_hz mm.
-    speed_law : float
     bandwidth_hz : float
         Constant.
     rms_g : float
@@ -47,7 +46,6 @@ class PlantedLayer:
         (v/200)^growth_speed · (F/2)^growth_force.
     sign : {1, -1}
         Of the gain, over the whole texture.
-    growth_speed, growth_force : float
     """
 
     frequency_hz: float

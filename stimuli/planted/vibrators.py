@@ -28,7 +28,6 @@ class SimulatedVibrator:
         ω/2π, 1 Hz … 0.49 rate.
     quality : float
         Q > 0; the −3 dB width of the resonance is frequency_hz/Q.
-    rate_hz : float
 
     Raises
     ------

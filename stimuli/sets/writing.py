@@ -117,7 +117,6 @@ def write_set(
     folder : path
         Appears whole or not at all; replaced if it was a stimulus set, refused if it was not
         (`check_place`).
-    recipe : Recipe
     sources : Sources, optional
         The recipe's, where they are loaded already.
     progress : callable, optional

@@ -84,7 +84,6 @@ def examined(
 
     Parameters
     ----------
-    cases : sequence of Case
     full : bool
         With all runs, or with the few of the reduced atlas.
     jobs : int, optional

@@ -15,7 +15,6 @@ def figure_correct_rates(found: ClaimFound, *, chance: float, simulated: bool) -
 
     Parameters
     ----------
-    found : ClaimFound
     chance : float
         Rate of a guessing participant, drawn as a line; NaN for none.
     simulated : bool

@@ -48,7 +48,6 @@ def answer(found: Sequence[ClaimFound], responses: Responses) -> str:
 
     Parameters
     ----------
-    found : sequence of ClaimFound
     responses : Responses
         Who answered, and where.
     """

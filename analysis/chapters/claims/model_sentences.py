@@ -25,7 +25,6 @@ def model_methods(responses: Responses, found: Sequence[ClaimFound]) -> list[str
 
     Parameters
     ----------
-    responses : Responses
     found : sequence of ClaimFound
         Of finished tasks.
     """
@@ -53,7 +52,6 @@ def decided_by_tests(responses: Responses, found: Sequence[ClaimFound]) -> list[
     ----------
     responses : Responses
         Of a plan whose rule is the model.
-    found : sequence of ClaimFound
     """
     names = [
         one.claim.name

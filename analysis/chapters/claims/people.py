@@ -43,7 +43,6 @@ def people_items(found: Sequence[ClaimFound], *, simulated: bool) -> tuple[Item,
     ----------
     found : sequence of ClaimFound
         Of finished tasks.
-    simulated : bool
     """
     own = [one for one in found if one.people is not None]
     if not own:

@@ -59,7 +59,6 @@ def plot_people(found: ClaimFound, *, simulated: bool, ax: Axes | None = None) -
         Decided by the model of the participants.
     simulated : bool
         Written into the figure.
-    ax : Axes, optional
     """
     ax = axes_or_new(ax)
     unit, factor = unit_of(found.claim.measure)

@@ -51,7 +51,6 @@ def headline(found: ClaimFound, row: Row, *, what: str) -> str:
 
     Parameters
     ----------
-    found : ClaimFound
     row : Row
         Over all textures.
     what : str

@@ -180,7 +180,6 @@ def _cautions(responses: Responses, *, inconclusive: bool) -> list[str]:
 
     Parameters
     ----------
-    responses : Responses
     inconclusive : bool
         Whether some test shows neither a difference nor equivalence.
     """

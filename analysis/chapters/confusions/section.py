@@ -109,7 +109,6 @@ def confusion_section(
         Of the stream's task; `layout` lists the alternatives.
     models : sequence of str
         Two sets at least.
-    simulated : bool
     stream : Stream
         Its generator draws swaps, layouts and tables.
     """

@@ -68,8 +68,6 @@ def plot_measure(
     measure : str
         One of `LABELS`.
     models : (str, str)
-    simulated : bool
-    ax : Axes, optional
     """
     ax = axes_or_new(ax)
     values = means[["reference", "other"]].to_numpy(dtype=float)

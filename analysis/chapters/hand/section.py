@@ -61,7 +61,6 @@ def hand_section(
         From `analysis.answers.hand.load_hand`.
     models : (str, str)
         The reference, and the other one.
-    simulated : bool
     rng : Generator
         Draws sign flips.
     """

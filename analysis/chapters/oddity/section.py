@@ -65,7 +65,6 @@ def oddity_section(
     ----------
     found : sequence of ClaimFound
         Of this task, with tests; one at least.
-    responses : Responses
     ending : str
         Of the names of the section's files.
     """

@@ -72,7 +72,6 @@ def reliability_section(
     chances : mapping of task to float
         Rate of a guessing participant in tasks with right answers, 0 … 1; others are not judged
         by it.
-    simulated : bool
     rng : Generator
         Draws sign flips.
     """

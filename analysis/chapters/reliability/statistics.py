@@ -67,7 +67,6 @@ def agreement(ratings: pd.DataFrame, scale: str) -> pd.DataFrame:
     ratings : DataFrame
         participant_id, texture, model and `scale`, a row per answer (NaN: not answered). What is
         rated are the cells texture × model; the participants are the raters. Repeats are averaged.
-    scale : str
 
     Returns
     -------
@@ -141,7 +140,6 @@ def rater_table(ratings: pd.DataFrame, scale: str) -> pd.DataFrame:
     ----------
     ratings : DataFrame
         As in `agreement`.
-    scale : str
 
     Returns
     -------
@@ -203,7 +201,6 @@ def same_ratings(ratings: pd.DataFrame, scale: str) -> pd.DataFrame:
     ----------
     ratings : DataFrame
         participant_id and `scale`.
-    scale : str
 
     Returns
     -------

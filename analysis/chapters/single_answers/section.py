@@ -69,7 +69,6 @@ def mixed_section(
 
     Parameters
     ----------
-    responses : Responses
     found : sequence of ClaimFound
         With tests, of any tasks. Claims about tasks whose trials contain both models are skipped.
     rng : Generator

@@ -130,7 +130,6 @@ def right_and_wrong(
     ----------
     answers : DataFrame
         As in `speed_and_accuracy`.
-    models : sequence of str
     rng : Generator
         Draws sign flips.
 

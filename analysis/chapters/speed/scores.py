@@ -71,7 +71,6 @@ def speed_and_accuracy(answers: pd.DataFrame, *, models: Sequence[str]) -> pd.Da
     answers : DataFrame
         participant_id, texture, model, response_time_s (s) and correct (0, 1 or NaN), a row per
         trial. Trials without an answer or a time above 0 are left out.
-    models : sequence of str
 
     Returns
     -------

@@ -95,7 +95,6 @@ def speed_accuracy_section(
         Tasks with `Responses.answers`, textures with identical models left out.
     models : (str, str)
         The reference, and the other one.
-    simulated : bool
     """
     items: list[Item] = []
     outcomes: list[Outcome] = []

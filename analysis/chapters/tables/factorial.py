@@ -125,7 +125,6 @@ def cell_means(cells: pd.DataFrame, factors: Sequence[str]) -> pd.DataFrame:
     ----------
     cells : DataFrame
         From `participant_cells`.
-    factors : sequence of str
 
     Returns
     -------
@@ -151,7 +150,6 @@ def complete_cells(cells: pd.DataFrame, factors: Sequence[str]) -> CompleteCells
     ----------
     cells : DataFrame
         From `participant_cells`.
-    factors : sequence of str
 
     Raises
     ------

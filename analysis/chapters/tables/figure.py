@@ -83,7 +83,6 @@ def plot_levels(
         In their order along x.
     simulated : bool
         Written into the figure.
-    ax : Axes, optional
     """
     ax = axes_or_new(ax)
     place = np.arange(len(levels))

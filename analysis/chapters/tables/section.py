@@ -43,7 +43,6 @@ def table_sections(imported: ImportedAnswers, *, rng: np.random.Generator) -> li
 
     Parameters
     ----------
-    imported : ImportedAnswers
     rng : Generator
         Draws the sign flips of the paired tests.
     """

@@ -33,9 +33,6 @@ class ChoiceSampler:
     ----------
     studies : ChoiceStudies
         Missing people were asked nothing.
-    model : DecisionModel
-    priors : ChoicePriors
-    rng : Generator
     """
 
     def __init__(

@@ -52,7 +52,6 @@ def rating_studies(
         participant_id, session, trial, texture, model and `column`; a row for each rating.
     checks : DataFrame
         Ratings of anchors, with virtual_texture; none where there are no rows.
-    column : str
     models : (str, str)
         The reference first.
     people : sequence of str
@@ -81,7 +80,6 @@ def choice_studies(
     ----------
     answers, checks : DataFrame
         With correct (0 or 1); `checks` are catch trials.
-    models, people : sequence of str
     """
     known = answers[answers["correct"].notna()]
     cells, places = _cells(known, models, people)

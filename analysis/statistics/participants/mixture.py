@@ -30,10 +30,8 @@ class MixtureOfEffects:
 
     Parameters
     ----------
-    priors : EffectPriors
     studies : int
         B.
-    rng : Generator
     """
 
     def __init__(self, priors: EffectPriors, studies: int, *, rng: np.random.Generator) -> None:
@@ -140,7 +138,6 @@ def vague_mean(
     who : (B, n) ndarray of bool
     widest : float
         The SD of people is flat between 0 and this.
-    rng : Generator
     """
     places = (np.arange(_SPREADS) + 0.5) / _SPREADS
     grid = widest * places**2

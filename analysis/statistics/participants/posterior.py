@@ -98,9 +98,6 @@ def rating_draws(
         Smaller studies filled up with missing answers.
     bounds : (float, float)
         In points.
-    rng : Generator
-    priors : RatingPriors, optional
-    effort : Effort, optional
     """
     effort = effort or Effort()
     tiled = _tiled(studies, effort.chains)

@@ -41,8 +41,6 @@ class RatingSampler:
     ----------
     studies : RatingStudies
         Missing people have missing answers alone.
-    priors : RatingPriors
-    rng : Generator
     """
 
     def __init__(

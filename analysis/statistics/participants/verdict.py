@@ -128,7 +128,6 @@ class PeopleJudged:
 
     Parameters
     ----------
-    summary : PeopleSummary
     textures : DataFrame
         `TEXTURE_COLUMNS`; p values are posterior probabilities: twice that of the less likely sign,
         and the larger one of lying beyond a bound.
@@ -179,7 +178,6 @@ def people_found(
         Of choices.
     people, textures : sequence of str
         In the order of the arrays.
-    rng : Generator
     """
     (draws,) = _sampler(studies, bounds, model=model, rng=rng)(effort=Effort())
     wide = _sampler(studies, bounds, model=model, rng=rng, doubled=True)
@@ -209,8 +207,6 @@ def judged_by_size(
         Of each claim; all of the same shape, with the same decision model.
     bounds : (float, float)
         Of all of them.
-    sizes : sequence of int
-    rng : Generator
     effort : Effort, optional
         `SHORT` without it.
 

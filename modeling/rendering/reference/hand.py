@@ -153,7 +153,6 @@ class GainRamps:
 
     Parameters
     ----------
-    plan : RenderPlan
     largest : (k,) ndarray
         Largest amplitude that each gain ever has.
     """
