@@ -2,6 +2,15 @@
 
 Balancing over participants is based on the *slot*, a place 1 … participants in the plan of
 a task, which the replacement of a dropout takes over; all shuffles follow from the subject.
+
+Several things are balanced at once: which model comes on which day, which comes first of a
+texture, which button is right. Each is balanced over a block of neighbouring slots by random
+numbers that these slots share (`block_of`: seed, task, number of the block, purpose), and dealt
+among them by Fisher–Yates. So balances cannot disturb each other, since their purposes draw
+independently; a study that ends early is balanced in every complete block; the number of a slot
+reveals nothing; and who replaces a dropout inherits what is balanced, while what is only shuffled
+is new. The purpose is part of the seed: renaming one, or another order of `TASKS`, changes the
+order of every study under way.
 """
 
 from __future__ import annotations

@@ -49,6 +49,15 @@ def rational_tan(angle: ArrayLike) -> Floats:
     return result
 
 
+# Why this form. Write one step as s' = A·s + b·w with A = [[1 + p, −q], [q, 1 + r]] and b = (b1,
+# b2). For every legal frequency and width A·Aᵀ + b·bᵀ = I: the rows of [A b] are orthonormal. Two
+# things follow for any course of the parameters, because each of them holds for a single step
+# alone. [A b] never lengthens a vector, so |s'|² ≤ |s|² + w²: no jump can make the state grow
+# faster than the input. And unit white noise takes a state of covariance I into another of
+# covariance I, so a band has its level at once, without a time to settle. What keeps the
+# identity: all numbers come from one angle and one k; parameters are interpolated, never
+# coefficients; the noise enters both states. A direct form has no such identity, and products of
+# its matrices may grow without bound.
 class BandCoefficients(NamedTuple):
     """Coefficients of the unit-covariance state-variable filter, one per band.
 

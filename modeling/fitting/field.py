@@ -250,6 +250,20 @@ class _There(NamedTuple):
     score: Floats
 
 
+# What is maximised, over the parameters θ of all nodes and the level ℓ of each record:
+#
+#     Σ log L(record | θ there, louder by ℓ) + Σ log t(ℓ/sd) − ½ Σ Δ'·precision·Δ − middles' cost
+#
+# L is Whittle's likelihood; t is Student's, so that a single record that is far off in level does
+# not bend the field; Δ are the differences of neighbours, less the trend. Easy to break are:
+#
+# - The levels are eliminated from each step. Each is one number that touches one record, so what
+#   they leave for the nodes is an outer product per record (a Schur complement), and the equations
+#   of the nodes stay block tridiagonal.
+# - `stiffness` is the weight of iteratively reweighted least squares, not the second derivative of
+#   −log t, which is negative beyond sd·√ν, where the heavy tail is needed.
+# - The trend is no unknown of the step. `following` puts it where the penalty is least for the
+#   parameters that are tried, and only values with a trend of their own are compared.
 def _looked_at(
     theta: Floats, level: Floats, signs: Floats | None, observed: Observed, field: Field
 ) -> _There:

@@ -117,7 +117,16 @@ static inline void tq_take(const uint64_t *slot, void *row, size_t words)
     }
 }
 
-/* Writes the next row of a ring: `count` says of a slot that it is being written before it is. */
+/* Why a row that is copied is whole, though nobody waits. Row n goes into the slot of row n − TQ_RING.
+   The writer has counted all rows before n when it begins to overwrite that slot, and its release fence
+   stands before the first word of row n; the reader's acquire fence stands after the last word that it
+   copied. So a reader that has copied even one word of row n sees a count of n or more when it looks
+   again, and gives up row n − TQ_RING and all before it. Hence a reader can trust TQ_RING − 1 rows, not
+   TQ_RING: of the oldest one the next row may be under way. What would break it: a fence behind the
+   words, words that are not atomic (a torn double is a plausible hand), a second writer, and counting
+   the row before it is whole. */
+
+/* Writes the next row of a ring; one writer only. */
 static inline void tq_append(uint64_t *ring, uint64_t *count, const void *row, size_t words)
 {
     uint64_t n = __atomic_load_n(count, __ATOMIC_RELAXED);
