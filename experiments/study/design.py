@@ -3,8 +3,8 @@
 Balancing over participants is based on the *slot*, a place 1 … participants in the plan of
 a task, which the replacement of a dropout takes over; all shuffles follow from the subject.
 
-Several things are balanced at once: which model comes on which day, which comes first of a
-texture, which button is right. Each is balanced over a block of neighbouring slots by random
+Several things are balanced over slots: which model comes on which day, which comes first of a
+texture. Each is balanced over a block of neighbouring slots by random
 numbers that these slots share (`block_of`: seed, task, number of the block, purpose), and dealt
 among them by Fisher–Yates. So balances cannot disturb each other, since their purposes draw
 independently; a study that ends early is balanced in every complete block; the number of a slot
