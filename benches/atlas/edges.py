@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from benches.atlas.case import FAILS, HOLDS, Case, Verdict
@@ -129,3 +129,18 @@ class _Probe:
             figure = float(self._case.measure(value, self._column, full=self._full))
             self._done[value] = Cell(value, figure, self._case.verdict(figure))
         return self._done[value]
+
+
+def columns_of(cases: Sequence[Case], *, full: bool) -> list[tuple[int, str]]:
+    """Every column by its case's number and its name; in the reduced atlas one of each case."""
+    return [
+        (number, column)
+        for number, case in enumerate(cases)
+        for column in list(case.columns)[: None if full else 1]
+    ]
+
+
+def examine_column(cases: Sequence[Case], which: tuple[int, str], *, full: bool) -> Examined:
+    """One of `columns_of`, in whatever process."""
+    number, column = which
+    return examine(cases[number], column, full=full)

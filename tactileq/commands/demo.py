@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING
 
 from tactileq.commands.simulate import run_study
-from tactileq.commands.stability import columns_of, examine_column
 from tactileq.commands.stimuli import render_set
+from tactileq.demo_benches import Benches, reported
 from tactileq.options import Out, Seed
 from tactileq.own_results import check_own_results
 from tactileq.printing import progress, share_of
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from analysis.page.sections import Section
     from analysis.textures.compared import Mapped
     from analysis.textures.results import TextureResult
-    from benches.atlas.edges import Examined
-    from benches.chart.judging import Judged
     from experiments.observers.psychometrics import Psychometrics
     from modeling import ARModel, Threshold
     from stimuli.sets.recipe import Recipe
@@ -30,8 +28,6 @@ JOBS = 2
 # Points by which simulated participants rate simplified models lower; no points elsewhere. So many
 # that the tests find them in 39 of 40 simulations (12 points: in 32).
 PLANTED_TEXTURE, PLANTED_POINTS = "PVC", -15.0
-CHART_TURNS = 5
-Result = TypeVar("Result")
 
 
 def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
@@ -54,7 +50,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
     with replace_folder(out, seen) as fresh, mapping(jobs=JOBS) as mapped:
         record = partial(demo_texture, folder=fresh, threshold=threshold, seed=seed)
         with progress("Recording, modeling, simplifying", len(TEXTURES)) as advance:
-            made = list(_reported(mapped(record, TEXTURES), advance, _texture))
+            made = list(reported(mapped(record, TEXTURES), advance, _texture))
         # Other processes check the models while this one presents them.
         checked, benches = mapped(with_checks, made), Benches.begun(mapped, made)
         render_set(demo_recipe(fresh, seed=seed), fresh / "stimuli")
@@ -76,7 +72,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
             psychometrics=population,
         )
         with progress("Predicting conditions that were left out", len(made)) as advance:
-            results, rivals = zip(*_reported(checked, advance, lambda c: c[0].texture), strict=True)
+            results, rivals = zip(*reported(checked, advance, lambda c: c[0].texture), strict=True)
         settings = {
             "estimators": [m.estimator for m in (results[0].model, *results[0].other_estimates)],
             "threshold": threshold.name,
@@ -164,59 +160,6 @@ def with_checks(result: TextureResult) -> tuple[TextureResult, ARModel]:
     return checked, fit_ar_spectra(measured, order=RIVAL_ORDER)
 
 
-class Benches(NamedTuple):
-    """Scenes, the reduced chart's textures and the reduced atlas's columns, done by others."""
-
-    scenes: Iterable[Any]
-    judged: Iterable[Judged]
-    examined: Iterable[Examined]
-
-    @classmethod
-    def begun(cls, mapped: Mapped, made: Sequence[TextureResult]) -> Benches:
-        """All of them, from now on."""
-        from benches.atlas.cases import CASES
-        from benches.chart.judging import judge
-        from benches.chart.methods import BRIEF
-        from benches.chart.surfaces import FEW_SURFACES, simulated_sources
-        from benches.scenes.examples import compile_examples, drawn_example
-
-        models = {result.texture: result.model for result in made}
-        return cls(
-            # One call, as what has one item alone is done by this process.
-            mapped(_done, [partial(compile_examples, models), drawn_example]),
-            mapped(partial(judge, methods=BRIEF), simulated_sources(FEW_SURFACES)),
-            mapped(partial(examine_column, CASES, full=False), columns_of(CASES, full=False)),
-        )
-
-    def sections(self, rivals: Iterable[ARModel]) -> list[Section]:
-        """What scenes need, speed against accuracy, and where methods fail, when all is done.
-
-        `rivals` are the AR models of the planted textures' recordings.
-        """
-        from benches.atlas.cases import CASES
-        from benches.atlas.section import stability_section
-        from benches.chart.chart import chart_of
-        from benches.chart.page import chart_section
-        from benches.chart.surfaces import FEW_SURFACES
-        from benches.scenes.examples import Surface
-        from benches.scenes.section import scene_section
-        from stimuli.planted.textures import PlantedSurface
-
-        surfaces = {m.texture: Surface(PlantedSurface(m.texture), m) for m in rivals}
-        with progress("Compiling scenes", 2) as advance:
-            compiled, drawn = _reported(
-                self.scenes, advance, lambda found: found[0].compiled.scene.name
-            )
-        scenes = scene_section([*((one, surfaces) for one in compiled), drawn])
-        with progress("Speed against accuracy", FEW_SURFACES.drawn) as advance:
-            judged = list(_reported(self.judged, advance, lambda one: one.source.name))
-        with progress("Where methods fail", len(columns_of(CASES, full=False))) as advance:
-            examined = list(_reported(self.examined, advance, lambda one: one.case.family))
-        # Rendering is timed now that no other process works.
-        chart = chart_section(chart_of(judged, turns=CHART_TURNS))
-        return [scenes, chart, stability_section(examined)]
-
-
 def write_demo_report(
     folder: Path,
     results: Sequence[TextureResult],
@@ -246,20 +189,6 @@ def write_demo_report(
             progress=advance,
             mapped=mapped,
         )
-
-
-def _done(task: Any) -> Any:
-    """What a task gives; by name, so that another process can be sent it."""
-    return task()
-
-
-def _reported(
-    results: Iterable[Result], advance: Callable[[str], None], name: Callable[[Result], str]
-) -> Iterator[Result]:
-    """The results, each reported by its name as it comes."""
-    for result in results:
-        advance(name(result))
-        yield result
 
 
 def _texture(result: TextureResult) -> str:

@@ -46,6 +46,7 @@ def stability(
     Example: tactileq stability --only filters
     """
     from benches.atlas.cases import CASES
+    from benches.atlas.edges import columns_of
 
     seen = check_own_results(out, "stability")
     chosen = cases_of(CASES, only)
@@ -91,6 +92,8 @@ def examined(
     advance : callable, optional
         Called with the name of each column that is done.
     """
+    from benches.atlas.edges import columns_of, examine_column
+
     found: dict[int, Examined] = {}
     columns = columns_of(cases, full=full)
     with working(partial(examine_column, cases, full=full), columns, jobs=jobs) as done:
@@ -98,23 +101,6 @@ def examined(
             found[number] = one
             advance(" · ".join(filter(None, (one.case.family, one.case.method, one.column))))
     return [found[number] for number in sorted(found)]
-
-
-def columns_of(cases: Sequence[Case], *, full: bool) -> list[tuple[int, str]]:
-    """Every column by its case's number and its name; in the reduced atlas one of each case."""
-    return [
-        (number, column)
-        for number, case in enumerate(cases)
-        for column in list(case.columns)[: None if full else 1]
-    ]
-
-
-def examine_column(cases: Sequence[Case], which: tuple[int, str], *, full: bool) -> Examined:
-    """One of `columns_of`, in whatever process."""
-    from benches.atlas.edges import examine
-
-    number, column = which
-    return examine(cases[number], column, full=full)
 
 
 def _write(

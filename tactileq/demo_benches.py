@@ -1,0 +1,89 @@
+"""The benches of the demo's report: scenes, a reduced chart and a reduced atlas, done beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+from tactileq.printing import progress
+
+if TYPE_CHECKING:
+    from analysis.page.sections import Section
+    from analysis.textures.compared import Mapped
+    from analysis.textures.results import TextureResult
+    from benches.atlas.edges import Examined
+    from benches.chart.judging import Judged
+    from modeling import ARModel
+
+CHART_TURNS = 5
+Result = TypeVar("Result")
+
+
+class Benches(NamedTuple):
+    """Scenes, the reduced chart's textures and the reduced atlas's columns, done by others."""
+
+    scenes: Iterable[Any]
+    judged: Iterable[Judged]
+    examined: Iterable[Examined]
+
+    @classmethod
+    def begun(cls, mapped: Mapped, made: Sequence[TextureResult]) -> Benches:
+        """All of them, from now on."""
+        from benches.atlas.cases import CASES
+        from benches.atlas.edges import columns_of, examine_column
+        from benches.chart.judging import judge
+        from benches.chart.methods import BRIEF
+        from benches.chart.surfaces import FEW_SURFACES, simulated_sources
+        from benches.scenes.examples import compile_examples, drawn_example
+
+        models = {result.texture: result.model for result in made}
+        return cls(
+            # One call, as what has one item alone is done by this process.
+            mapped(_done, [partial(compile_examples, models), drawn_example]),
+            mapped(partial(judge, methods=BRIEF), simulated_sources(FEW_SURFACES)),
+            mapped(partial(examine_column, CASES, full=False), columns_of(CASES, full=False)),
+        )
+
+    def sections(self, rivals: Iterable[ARModel]) -> list[Section]:
+        """What scenes need, speed against accuracy, and where methods fail, when all is done.
+
+        `rivals` are the AR models of the planted textures' recordings.
+        """
+        from benches.atlas.cases import CASES
+        from benches.atlas.edges import columns_of
+        from benches.atlas.section import stability_section
+        from benches.chart.chart import chart_of
+        from benches.chart.page import chart_section
+        from benches.chart.surfaces import FEW_SURFACES
+        from benches.scenes.examples import Surface
+        from benches.scenes.section import scene_section
+        from stimuli.planted.textures import PlantedSurface
+
+        surfaces = {m.texture: Surface(PlantedSurface(m.texture), m) for m in rivals}
+        with progress("Compiling scenes", 2) as advance:
+            compiled, drawn = reported(
+                self.scenes, advance, lambda found: found[0].compiled.scene.name
+            )
+        scenes = scene_section([*((one, surfaces) for one in compiled), drawn])
+        with progress("Speed against accuracy", FEW_SURFACES.drawn) as advance:
+            judged = list(reported(self.judged, advance, lambda one: one.source.name))
+        with progress("Where methods fail", len(columns_of(CASES, full=False))) as advance:
+            examined = list(reported(self.examined, advance, lambda one: one.case.family))
+        # Rendering is timed now that no other process works.
+        chart = chart_section(chart_of(judged, turns=CHART_TURNS))
+        return [scenes, chart, stability_section(examined)]
+
+
+def _done(task: Any) -> Any:
+    """What a task gives; by name, so that another process can be sent it."""
+    return task()
+
+
+def reported(
+    results: Iterable[Result], advance: Callable[[str], None], name: Callable[[Result], str]
+) -> Iterator[Result]:
+    """The results, each reported by its name as it comes."""
+    for result in results:
+        advance(name(result))
+        yield result
