@@ -63,7 +63,7 @@ def spoil(path: Path, seed: int) -> None:
 
 def answers_of(folder: Path, *people: str, exclude: tuple[str, ...] = ()) -> pd.DataFrame:
     """The ratings of some people, as `tactileq analyze` reads them."""
-    found = read_answers({"": folder}, exclude).absolute
+    found = read_answers({"": folder}, exclude).answers["absolute"]
     return found[found["participant_id"].isin(people)].reset_index(drop=True)
 
 

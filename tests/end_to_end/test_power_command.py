@@ -108,8 +108,8 @@ def test_the_report_gets_the_appendix(main, place: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(validation, "cells", lambda: few)
     of_model = [("ratings: split ± 10", 8), ("oddity: nobody feels it", 8)]
     monkeypatch.setattr(validation_model, "model_cells", lambda: of_model)
-    ranks = {"odd one out": validation_ranks.KINDS["odd one out"]}
-    monkeypatch.setattr(validation_ranks, "KINDS", ranks)
+    ranks = {"odd one out": validation_ranks.RANK_KINDS["odd one out"]}
+    monkeypatch.setattr(validation_ranks, "RANK_KINDS", ranks)
     monkeypatch.setattr(validation_ranks, "STEPS", 100)
     assert main("simulate", "--study", "study.toml", "--data", "data").returncode == 0
     told = main("analyze", "data", "--validate", 8, "--jobs", 1)
