@@ -35,7 +35,9 @@ from modeling.fitting.equations import Blocks, Corners, band_of, rows_of, solve_
 # known: a sixth in each parameter, and 3 dB more in the level of all gains together. It counts as
 # much as one difference more than there are parameters. Chosen where fits of planted and of drawn
 # surfaces are nearest to their truths; three times looser or stiffer changes the distances by up to
-# a tenth (docs/studies/real_surfaces.md).
+# a tenth (docs/studies/real_surfaces.md). Doubled on 11 drawn surfaces (tools/double_constants.py):
+# +14 %, worst +47 %, two layers fewer, as looser differences make a layer worth less; that of the
+# level +1 %, worst +20 %.
 PRIOR_CHANGE = 0.175
 PRIOR_LEVEL_CHANGE = 0.38
 # Precision of a parameter that no record determines: a deviation of 30 in its logarithm.

@@ -18,11 +18,12 @@ from modeling.estimation.coherent import Observed, response
 from modeling.estimation.likelihood import FORGIVEN_MISFIT, LOWEST_FITTED_HZ, Power, split
 from modeling.fitting.texture_grid import TextureGrid
 
-CELL = 0.02  # of log frequency
+# What doubling does: see `layer_search`.
+CELL = 0.02  # of log frequency; doubled: +4 %, worst +45 %, three layers fewer
 WIDTHS = (1, 2, 4, 8, 16, 32, 64)  # of boxes, in cells
 # From a square root outwards: of equal supports the first, so the less extreme, wins.
 EXPONENTS = np.array(sorted(np.linspace(-0.3, 1.3, 17), key=lambda p: abs(p - 0.5)))
-# No single condition counts for more than this in log likelihood.
+# No single condition counts for more than this in log likelihood. Doubled: −1 %, worst +7 %.
 CLEAR_EVIDENCE = 40.0
 CANDIDATES = 3
 RAISED = (1.3, 1e4)  # power ratio at which a new layer starts
