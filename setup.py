@@ -5,6 +5,8 @@ from setuptools import Extension, setup
 
 PARTS = ("kernel", "kernel_single", "many", "slopes", "rivals", "live")
 
+ABI = "0x030B0000"  # the stable interface as of Python 3.11: one wheel for all later ones
+
 setup(
     cffi_modules=[f"tools/c_parts.py:{part}" for part in PARTS],
     ext_modules=[
@@ -12,8 +14,11 @@ setup(
             "modeling.rendering._call",
             ["modeling/rendering/call.c"],
             include_dirs=[numpy.get_include()],
+            define_macros=[("Py_LIMITED_API", ABI)],
             extra_compile_args=["-std=c99", "-O2"],
+            py_limited_api=True,
             optional=True,
         )
     ],
+    options={"bdist_wheel": {"py_limited_api": "cp311"}},
 )

@@ -10,11 +10,13 @@ import os
 import platform
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import starmap
 from math import log10
 from pathlib import Path
 from typing import Literal
 
 from modeling.errors import InputError, counted
+from modeling.extras import Extra, MissingExtra, install_advice
 from modeling.files.provenance import version_of
 from modeling.rendering.compiled import is_compiled
 from rig.hand.devices import connected_devices
@@ -32,7 +34,11 @@ from rig.sound.devices import (
 )
 
 State = Literal["ok", "note", "fault"]
-PACKAGES = ("tactileq", "numpy", "scipy", "sounddevice", "pyserial", "psychopy")
+PACKAGES: dict[str, Extra | None] = {
+    **dict.fromkeys(("tactileq", "numpy", "scipy")),
+    **dict.fromkeys(("sounddevice", "pyserial"), "rig"),
+    "psychopy": "console",
+}
 GROUPS = {"tablet": "input", "mouse": "input", "serial": "dialout"}  # who may read, on Debian
 OLD_DAYS = 90  # a study may ask for less
 _WITHOUT_PORTAUDIO = "not known without PortAudio"  # which is a separate fault, reported once
@@ -58,7 +64,7 @@ class Finding:
 def versions() -> list[Finding]:
     """Programs and libraries, and whether the compiled parts are there."""
     found = [Finding("Python", f"{platform.python_version()}, {platform.platform(terse=True)}")]
-    found += map(_package, PACKAGES)
+    found += starmap(_package, PACKAGES.items())
     found.append(_tried("PortAudio", lambda: portaudio().get_portaudio_version()[1].split(",")[0]))
     rendering = Finding("rendering kernel", "compiled")
     if not is_compiled():
@@ -67,10 +73,11 @@ def versions() -> list[Finding]:
     return [*found, rendering, _tried("audio callback", lambda: str(compiled() and "compiled"))]
 
 
-def _package(name: str) -> Finding:
+def _package(name: str, extra: Extra | None) -> Finding:
     version = version_of(name)
     if version is None:
-        return Finding(name, f"expected {name}, got none; pip install {name}.", "note")
+        advice = f"pip install {name}" if extra is None else install_advice(extra)
+        return Finding(name, f"expected {name}, got none; {advice}.", "note")
     return Finding(name, version)
 
 
@@ -78,7 +85,7 @@ def connected_sound() -> list[Finding]:
     """All sound devices: channels, usual rate."""
     try:
         devices = sound_devices()
-    except NoPortAudio:
+    except (NoPortAudio, MissingExtra):
         return [Finding("sound", _WITHOUT_PORTAUDIO, "note")]
     except InputError as error:
         return [Finding("sound", str(error), "fault")]
@@ -163,7 +170,7 @@ def _card(
     try:
         device = find_device(name, direction, channels=channels)
         check_rate(device, direction, rate_hz=rate_hz, channels=channels)
-    except NoPortAudio:
+    except (NoPortAudio, MissingExtra):
         return Finding(what, _WITHOUT_PORTAUDIO, "note")
     except InputError as error:
         return Finding(what, str(error), "fault")

@@ -8,7 +8,6 @@ from html import escape
 from importlib import resources
 
 import pandas as pd
-from plotly.offline import get_plotlyjs
 
 from analysis.columns import table_bytes
 from analysis.page.page import (
@@ -33,6 +32,7 @@ from benches.chart.summary import (
     default_rows,
 )
 from benches.chart.surfaces import SURFACE_KINDS, counted_kind
+from modeling.extras import extra
 from modeling.files.columns import names, without
 
 COSTS = (
@@ -217,6 +217,20 @@ def _page(chart: Chart, pictures: str) -> str:
     )
 
 
+def plotly_script() -> str:
+    """Plotly, which draws the page's interactive chart.
+
+    Raises
+    ------
+    MissingExtra
+        Without the extra chart.
+    """
+    with extra("chart"):
+        from plotly.offline import get_plotlyjs
+    script: str = get_plotlyjs()
+    return script
+
+
 def _interactive(chart: Chart) -> str:
     kinds = [(kind, SURFACE_KINDS[kind]) for kind in chart.kinds]
     data = json.dumps(_data(chart), allow_nan=False).replace("</", "<\\/")
@@ -230,7 +244,7 @@ def _interactive(chart: Chart) -> str:
         "precisions</label></p>"
         '<div id="chart-plot"></div>'
         f'<script type="application/json" id="chart-data">{data}</script>'
-        f"<script>{get_plotlyjs()}</script>"
+        f"<script>{plotly_script()}</script>"
         f"<script>{script.read_text(encoding='utf-8')}</script>"
     )
 

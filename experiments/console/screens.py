@@ -7,6 +7,7 @@ from typing import Any
 
 from experiments.console.drawing import PAPER
 from modeling import InputError
+from modeling.extras import extra
 
 
 def open_window(*, size: tuple[int, int], fullscreen: bool, screen: int) -> Any:
@@ -18,7 +19,8 @@ def open_window(*, size: tuple[int, int], fullscreen: bool, screen: int) -> Any:
         For a screen that does not exist, where there is none at all, and without PsychoPy.
     """
     try:
-        from psychopy import logging, visual
+        with extra("console"):
+            from psychopy import logging, visual
 
         check_screen(screen)
         logging.console.setLevel(logging.ERROR)  # no monitor calibration is needed: not a warning
@@ -36,11 +38,6 @@ def open_window(*, size: tuple[int, int], fullscreen: bool, screen: int) -> Any:
         )
     except InputError:
         raise
-    except ModuleNotFoundError as error:
-        raise InputError(
-            f"expected PsychoPy for the window, got no module {error.name}; install it with "
-            "pip install psychopy."
-        ) from error
     except Exception as error:  # whatever the window system raises means the same to a user
         raise InputError(
             f"expected a screen for the window, got {error or type(error).__name__}; start a "

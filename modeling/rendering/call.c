@@ -1,8 +1,10 @@
 /* One call of the kernel from Python, as cheap as a call can be: `Call(owner, render, render_held,
    render_on, texture, state, single)` holds addresses of the kernel's functions and of what they work on,
-   and `call(speed, force, samples, out)` renders; speed and force are None for the hand as last read.
-   It takes what needs no conversion and answers None to anything else; modeling.rendering.renderer
-   converts and refuses.
+   and its method `render(speed, force, samples, out)` renders; speed and force are None for the hand as
+   last read. It takes what needs no conversion and answers None to anything else;
+   modeling.rendering.renderer converts and refuses.
+
+   Only Python's stable interface is used (setup.py defines Py_LIMITED_API): one build serves all versions.
 
    Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
 
@@ -29,7 +31,6 @@ typedef void on_call(const void *texture, void *state, void *out, size_t count);
 
 typedef struct {
     PyObject_HEAD
-    vectorcallfunc vectorcall;
     PyObject *owner; /* of texture and state */
     uintptr_t render, held, on;
     void *texture, *state;
@@ -117,8 +118,8 @@ static int hand_of(PyObject *speed, PyObject *force, Hand *hand, Py_ssize_t *len
     }
     if (!PyFloat_Check(speed) || !PyFloat_Check(force))
         return 0;
-    hand->speed = PyFloat_AS_DOUBLE(speed);
-    hand->force = PyFloat_AS_DOUBLE(force);
+    hand->speed = PyFloat_AsDouble(speed);
+    hand->force = PyFloat_AsDouble(force);
     return 1;
 }
 
@@ -132,14 +133,14 @@ static int overlaps(const Hand *hand, size_t length, PyArrayObject *out)
                             (forces < end && start < forces + size));
 }
 
-static PyObject *called(PyObject *self, PyObject *const *arguments, size_t flags, PyObject *names)
+static PyObject *called(PyObject *self, PyObject *const *arguments, Py_ssize_t given)
 {
     Call *c = (Call *)self;
     PyObject *samples, *out;
     PyArrayObject *array = NULL;
     Py_ssize_t count, wanted = -1;
     Hand hand;
-    if (PyVectorcall_NARGS(flags) != 4 || names) {
+    if (given != 4) {
         PyErr_SetString(PyExc_TypeError, "expected speed, force, samples and out, and nothing else");
         return NULL;
     }
@@ -204,10 +205,9 @@ static PyObject *new_call(PyTypeObject *type, PyObject *arguments, PyObject *nam
     (void)names;
     if (!PyArg_ParseTuple(arguments, "OKKKKKp", &owner, &render, &held, &on, &texture, &state, &single))
         return NULL;
-    c = (Call *)type->tp_alloc(type, 0);
+    c = (Call *)((allocfunc)PyType_GetSlot(type, Py_tp_alloc))(type, 0);
     if (!c)
         return NULL;
-    c->vectorcall = called;
     Py_INCREF(owner);
     c->owner = owner;
     c->render = (uintptr_t)render;
@@ -221,36 +221,49 @@ static PyObject *new_call(PyTypeObject *type, PyObject *arguments, PyObject *nam
 
 static void delete_call(PyObject *self)
 {
+    PyTypeObject *type = Py_TYPE(self);
     Py_XDECREF(((Call *)self)->owner);
-    Py_TYPE(self)->tp_free(self);
+    ((freefunc)PyType_GetSlot(type, Py_tp_free))(self);
+    Py_DECREF(type); /* each of its objects holds it */
 }
+
+static PyMethodDef methods[] = {
+    {"render", (PyCFunction)(void (*)(void))called, METH_FASTCALL, "the next samples"},
+    {NULL, NULL, 0, NULL},
+};
 
 static PyMemberDef members[] = {
     {"busy", T_INT, offsetof(Call, busy), READONLY, "whether it renders, in another thread"},
     {NULL, 0, 0, 0, NULL},
 };
 
-static PyTypeObject call_type = {
-    PyVarObject_HEAD_INIT(NULL, 0).tp_name = "modeling.rendering._call.Call",
-    .tp_basicsize = sizeof(Call),
-    .tp_flags = Py_TPFLAGS_DEFAULT | Py_TPFLAGS_HAVE_VECTORCALL,
-    .tp_vectorcall_offset = offsetof(Call, vectorcall),
-    .tp_call = PyVectorcall_Call,
-    .tp_new = new_call,
-    .tp_dealloc = delete_call,
-    .tp_members = members,
+static PyType_Slot slots[] = {
+    {Py_tp_new, (void *)new_call},
+    {Py_tp_dealloc, (void *)delete_call},
+    {Py_tp_methods, methods},
+    {Py_tp_members, members},
+    {0, NULL},
+};
+
+static PyType_Spec call_type = {
+    .name = "modeling.rendering._call.Call",
+    .basicsize = sizeof(Call),
+    .flags = Py_TPFLAGS_DEFAULT,
+    .slots = slots,
 };
 
 static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, .m_name = "_call", .m_size = -1};
 
 PyMODINIT_FUNC PyInit__call(void)
 {
-    PyObject *made;
+    PyObject *made, *type;
     import_array();
-    if (PyType_Ready(&call_type) < 0)
+    type = PyType_FromSpec(&call_type);
+    if (!type)
         return NULL;
     made = PyModule_Create(&module);
-    if (made && PyModule_AddObjectRef(made, "Call", (PyObject *)&call_type) < 0)
+    if (made && PyModule_AddObjectRef(made, "Call", type) < 0)
         Py_CLEAR(made);
+    Py_DECREF(type);
     return made;
 }

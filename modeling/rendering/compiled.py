@@ -97,7 +97,8 @@ class CompiledEngine:
             int(ffi.cast("uintptr_t", at)) for at in (*functions, self._texture, self._state)
         ]
         owner = (self._texture, self._state, self._memory, arrays)
-        self.call = Call(owner, *addresses, plan.single)
+        self._call = Call(owner, *addresses, plan.single)
+        self.call = self._call.render
 
     @property
     def counters(self) -> RenderCounters:
@@ -118,7 +119,7 @@ class CompiledEngine:
 
     def read(self, ago: float, speed_mm_s: float, force_n: float) -> None:
         """A reading that was made so many samples before the next one."""
-        if self.call.busy:  # type: ignore[attr-defined]
+        if self._call.busy:
             raise RuntimeError(
                 "expected a reading between two calls of a renderer, got one while another thread "
                 "renders; make a renderer for each thread."

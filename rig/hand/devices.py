@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 
 from modeling.errors import InputError
+from modeling.extras import MissingExtra
 from rig.hand.sample import ConnectedDevice, Device
 from rig.hand.scripted import ScriptedHand
 from rig.hand.settings import HandSettings
@@ -35,11 +37,17 @@ def open_device(settings: HandSettings) -> Device:
 
 
 def connected_devices() -> tuple[ConnectedDevice, ...]:
-    """What is connected that may measure a hand: input devices of Linux, and serial ports."""
-    from rig.hand.serial_sensor import serial_ports
+    """What is connected that may measure a hand: input devices of Linux, and serial ports.
 
+    Without the extra rig no port is known.
+    """
+    ports: tuple[ConnectedDevice, ...] = ()
+    with suppress(MissingExtra):
+        from rig.hand.serial_sensor import serial_ports
+
+        ports = serial_ports()
     if sys.platform != "linux":
-        return serial_ports()
+        return ports
     from rig.hand.evdev import input_devices
 
-    return input_devices() + serial_ports()
+    return input_devices() + ports

@@ -6,14 +6,16 @@ import os
 import select
 import time
 
-import serial
-from serial.tools import list_ports
-
 from modeling.errors import InputError, shown
+from modeling.extras import extra
 from rig.hand.sample import LOST_S, ConnectedDevice, DeviceLost, Sample
 from rig.hand.serial_line import LineReader, SensorClock, SensorLine
 from rig.hand.settings import HandSettings
 from rig.live.memory import now_s
+
+with extra("rig"):
+    import serial
+    from serial.tools import list_ports
 
 FIRST_LINE_S = 3.0  # many boards restart when their port is opened
 _POLL_S = 0.001

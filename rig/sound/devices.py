@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from modeling.errors import InputError, shown
+from modeling.extras import extra
 
 Direction = Literal["input", "output"]
 USUAL_RATES_HZ = (8000, 16000, 22050, 32000, 44100, 48000, 88200, 96000, 176400, 192000)
@@ -53,10 +54,13 @@ def portaudio() -> Any:
     Raises
     ------
     NoPortAudio
-        If it is missing.
+        If the sound library is missing.
+    MissingExtra
+        If the package is.
     """
     try:
-        import sounddevice
+        with extra("rig"):
+            import sounddevice
     except OSError:
         raise NoPortAudio(
             f"expected the sound library PortAudio, got none; {PORTAUDIO_HINT}."

@@ -122,7 +122,7 @@ def test_without_psychopy_the_rig_is_checked_all_the_same(monkeypatch: pytest.Mo
     monkeypatch.setattr("modeling.files.provenance.version", none)
     found = {finding.name: finding for finding in versions()}
     assert found["psychopy"].state == "note"
-    check_refusal(found["psychopy"].sentence, expected="psychopy", got="pip install psychopy")
+    check_refusal(found["psychopy"].sentence, expected="psychopy", got="tactileq[console]")
 
 
 def test_no_card_at_all_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
