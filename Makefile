@@ -1,10 +1,13 @@
 # make demo    the whole study in silico, ends with the path of its report
 # make test    style, types, import rules and every test
+# make test-core   the tests that need no extra, with every Python from 3.11 to 3.14 that is there
 # make quick ROOM=modeling/fitting   only the tests of one room
 # make bench   time the modeling and its rivals
 # make plant   plant 40 bugs, one at a time, and see which ones the tests catch
 # make install set up .venv/ from requirements.lock (demo and test begin with it)
 # make docs-tables   renew the tables of keys in docs/ and the JSON Schemas
+# make wheel   dist/ with sdist and wheel, and the demo from the wheel alone (PYTHON=…)
+# make cross   compile the C headers for Windows and macOS
 # make lock    renew requirements.lock from pyproject.toml (needs uv)
 
 SHELL := /bin/sh
@@ -20,7 +23,7 @@ unexport PYTHONDONTWRITEBYTECODE
 COMPILE := $(BIN)/python -W ignore -m compileall -q -j 0 -x '/tests?/'
 LOADED := numpy scipy pandas statsmodels sklearn pingouin seaborn matplotlib psychopy hypothesis _pytest
 
-.PHONY: install demo test quick bench plant lint lock docs-tables clean
+.PHONY: install demo test test-core quick bench plant lint lock docs-tables wheel cross clean
 
 install: .venv/installed
 
@@ -49,12 +52,22 @@ lint: install
 	$(BIN)/lint-imports
 
 # One process more than there are cores: one of them takes the tests in real time, which mostly wait.
+CORE_PYTHONS ?= python3.11 python3.12 python3.13 python3.14
 WORKERS := $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n $(WORKERS) --dist worksteal
 
 test: lint
 	@sh tools/system-packages
 	$(PYTEST) $(PYTEST_FLAGS)
+
+# Without psychopy, sounddevice, pyserial and plotly; what needs them is left out, and named.
+test-core:
+	@for python in $(CORE_PYTHONS); do \
+		$$python -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 15))' 2>/dev/null || continue; \
+		version=$$($$python -c 'import sys; print("%d.%d" % sys.version_info[:2])'); \
+		echo "The core with $$($$python --version) ..."; \
+		tools/core-python $$python && OPENBLAS_NUM_THREADS=1 .venv-core-$$version/bin/pytest -n $(WORKERS) --dist worksteal $(PYTEST_FLAGS) || exit 1; \
+	done
 
 quick: install
 	@test -d "tests/$(ROOM)" && test -n "$(ROOM)" || { echo "error: expected a room with tests, got ROOM=$(ROOM); for instance make quick ROOM=modeling/fitting." >&2; exit 1; }
@@ -70,8 +83,14 @@ plant: install
 docs-tables: install
 	$(BIN)/python tools/docs_tables.py
 
+wheel:
+	tools/try-wheel $(PYTHON)
+
+cross:
+	tools/cross-headers
+
 lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --extra test pyproject.toml -o requirements.lock
 
 clean:
-	rm -rf .venv demo build *.egg-info modeling/rendering/_kernel* modeling/rendering/_call.* modeling/rendering/_many.* modeling/estimation/_slopes.* benches/rendering/_rivals.* rig/live/_live.* .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-core-* demo dist build *.egg-info modeling/rendering/_kernel* modeling/rendering/_call.* modeling/rendering/_many.* modeling/estimation/_slopes.* benches/rendering/_rivals.* rig/live/_live.* .mypy_cache .pytest_cache .ruff_cache .hypothesis

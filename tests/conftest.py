@@ -25,6 +25,7 @@ from hypothesis import settings
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
+from tests.extras import is_to_collect, not_collected, skip_what_lacks_packages
 from tests.real_time import BareProcess, needs_time, repeat_where_the_machine_stood_still
 
 # A slow machine is no counterexample: hypothesis must not fail a test for its wall time.
@@ -59,7 +60,18 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 _BARE = BareProcess()
 
 
+def pytest_report_header() -> str:
+    return not_collected()
+
+
+def pytest_ignore_collect(collection_path: Path) -> bool | None:
+    if collection_path.suffix == ".py" and not is_to_collect(collection_path):
+        return True
+    return None  # others may have a reason
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    skip_what_lacks_packages(items)
     # First, so that one worker has them and the other does not wait for its turn.
     items.sort(key=needs_time, reverse=True)
     repeat_where_the_machine_stood_still(items, _BARE)

@@ -95,10 +95,10 @@ def bench_chart(
     from benches.chart.methods import chosen_methods
     from benches.chart.page import plotly_script
 
-    plotly_script()  # whether it is there is said before anything is charted
     seen = check_own_results(out, "bench chart")
     methods = chosen_methods(method or [], full=full)
     sources = chart_sources(recordings or [], toolkit or [], models or [], full=full)
+    plotly_script()  # whether it is there is said before anything is charted
     chart = charted(sources, methods, jobs=jobs, dask=dask)
     settings = {
         "methods": methods,

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import filelock
 import pytest
 
 from modeling import InputError
@@ -172,7 +171,7 @@ def test_a_disk_without_locks_is_used_without(lock: Lock, monkeypatch: pytest.Mo
     def none(_: int) -> bool:
         raise OSError(errno.ENOSYS, "Function not implemented")
 
-    monkeypatch.setattr(filelock._unix, "lock_fd_nonblocking", none)
+    monkeypatch.setattr("filelock._unix.lock_fd_nonblocking", none)
     (lock.path.parent / ".file.abcdefgh.unfinished").write_text("perhaps still in use")
     lock.acquire(0)
     assert not lock.is_held

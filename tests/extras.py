@@ -1,0 +1,77 @@
+"""Which tests need a package that the core does not install, and are skipped without it.
+
+`make test-core` runs without these packages, and `make test` with all of them and no test skipped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+# Module to files, and to single tests of files that otherwise run.
+NEEDING = {
+    "psychopy": (
+        "experiments/console/test_console.py",
+        "experiments/console/test_screens.py",
+        "experiments/console/test_selftest.py",
+        "experiments/feel/test_window.py",
+        "end_to_end/test_feel_command.py",
+        "end_to_end/test_session_on_a_rig.py",
+        "end_to_end/test_session_command.py::test_the_self_test_times_screen_rig_and_disk",
+        "end_to_end/test_session_command.py::test_a_session_that_is_ended_by_a_signal_goes_on",
+    ),
+    "sounddevice": (
+        "end_to_end/test_record_by_hand.py",
+        "end_to_end/test_rig_calibration.py",
+        "end_to_end/test_rig_monitor.py",
+        "end_to_end/test_rig_play.py",
+        "experiments/feel/test_opening.py",
+        "rig/capture/test_input.py",
+        "rig/desk",
+        "rig/sound/test_output.py",
+        "rig/sound/test_signals.py::test_what_is_not_compensated_yet",
+        "rig/test_inventory.py",
+    ),
+    "serial": (
+        "rig/hand/test_evdev.py::test_serial_ports",
+        "rig/hand/test_serial_sensor.py",
+        "rig/live/test_hand.py",
+    ),
+    "plotly": ("end_to_end/test_bench_chart.py",),
+    "distributed": ("end_to_end/test_power_command.py::test_dask",),
+    "importlinter": ("test_rooms.py",),
+    "bids_validator_deno": ("experiments/sessions/test_bids.py::test_the_validator",),
+}
+LACKING = {module: tests for module, tests in NEEDING.items() if find_spec(module) is None}
+
+
+def is_to_collect(path: Path) -> bool:
+    """Whether a file of tests can be imported: it needs nothing that is missing."""
+    return not any(_lies_in(f"{_of_tests(path)}::", tests) for tests in LACKING.values())
+
+
+def skip_what_lacks_packages(items: Iterable[pytest.Item]) -> None:
+    """Mark single tests whose package is missing."""
+    for item in items:
+        name = f"{_of_tests(item.path)}::{item.name}"
+        for module, tests in LACKING.items():
+            if _lies_in(name, tests):
+                item.add_marker(pytest.mark.skip(reason=f"needs {module}"))
+
+
+def not_collected() -> str:
+    """A line on the files that are left out; empty where nothing is missing."""
+    left_out = ", ".join(f"{len(tests)} of {module}" for module, tests in LACKING.items())
+    return f"without these packages, files or tests left out: {left_out}" if left_out else ""
+
+
+def _of_tests(path: Path) -> str:
+    return path.relative_to(ROOT / "tests").as_posix()
+
+
+def _lies_in(name: str, tests: Iterable[str]) -> bool:
+    return any(name.startswith((f"{test}::", f"{test}/") if "::" not in test else test) for test in tests)

@@ -1,0 +1,96 @@
+"""What is released: everything in the sdist, wheels for all Pythons, citation and limits that agree."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tarfile
+import tomllib
+from importlib.machinery import EXTENSION_SUFFIXES
+from pathlib import Path
+
+import pytest
+
+from modeling.extras import CONSOLE_BEFORE, Extra
+from modeling.rendering import compiled
+
+ROOT = Path(__file__).parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="the list of files is git's")
+def test_the_sdist_holds_what_the_repository_holds(tmp_path: Path) -> None:
+    build = [sys.executable, "setup.py", "-q", "egg_info", "--egg-base", tmp_path]
+    subprocess.run([*build, "sdist", "--dist-dir", tmp_path], cwd=ROOT, check=True)
+    (made,) = tmp_path.glob("*.tar.gz")
+    with tarfile.open(made) as archive:
+        held = {"/".join(name.split("/")[1:]) for name in archive.getnames()}
+    tracked = subprocess.run(
+        ["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True
+    ).stdout.splitlines()
+    assert set(tracked) <= held
+    surplus = {name for name in held - set(tracked) if name.endswith((".c", ".so", ".pyc", ".py"))}
+    assert not surplus
+
+
+@pytest.mark.skipif(compiled.Call is None, reason="no kernel was compiled")
+def test_every_c_part_keeps_to_the_stable_interface() -> None:
+    """One wheel serves all versions of Python only if no part is built for this one alone."""
+    stable = tuple(suffix for suffix in EXTENSION_SUFFIXES if "abi3" in suffix)
+    own = tuple(suffix for suffix in EXTENSION_SUFFIXES if "cpython" in suffix or "cp3" in suffix)
+    rooms = ("modeling", "rig", "benches")
+    parts = [p.name for room in rooms for p in (ROOT / room).rglob("_*.*") if p.suffix != ".c"]
+    assert len([name for name in parts if name.endswith(stable)]) == 7
+    assert not [name for name in parts if name.endswith(own)]
+
+
+def test_the_citation_names_this_version() -> None:
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    stated = dict(re.findall(r"^([a-z-]+): (.+)$", citation, re.MULTILINE))
+    assert stated["version"] == PROJECT["version"]
+    assert stated["title"] == PROJECT["name"]
+    assert stated["license"] == PROJECT["license"]
+    assert PROJECT["authors"][0]["name"] in citation
+
+
+def test_the_extras_are_those_that_sentences_name() -> None:
+    extras = PROJECT["optional-dependencies"]
+    assert set(Extra.__args__) <= extras.keys()
+    (psychopy,) = extras["console"]
+    assert psychopy.endswith(f"; python_version < '{'.'.join(map(str, CONSOLE_BEFORE))}'")
+
+
+def test_the_core_needs_none_of_what_extras_install(tmp_path: Path) -> None:
+    """Loading every module of the core but those that a screen, card or port needs."""
+    lines = "\n".join(
+        (
+            "import sys, pkgutil, importlib",
+            "for hidden in ('psychopy', 'pyglet', 'sounddevice', 'serial', 'plotly', 'distributed'):",
+            "    sys.modules[hidden] = None",
+            "from modeling.extras import MissingExtra",
+            "refused = []",
+            "rooms = ('modeling', 'stimuli', 'rig', 'experiments', 'analysis', 'benches', 'tactileq')",
+            "for room in map(importlib.import_module, rooms):",
+            "    for module in pkgutil.walk_packages(room.__path__, f'{room.__name__}.'):",
+            "        if module.name != 'tactileq.__main__':",
+            "            try: importlib.import_module(module.name)",
+            "            except MissingExtra: refused.append(module.name)",
+            "print(*refused)",
+        )
+    )
+    environment = {k: v for k, v in os.environ.items() if k != "DISPLAY"}
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", lines],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert set(done.stdout.split()) <= {
+        "rig.hand.serial_sensor",
+        "experiments.console.events",
+        "experiments.feel.plots",
+    }
