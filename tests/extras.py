@@ -74,4 +74,6 @@ def _of_tests(path: Path) -> str:
 
 
 def _lies_in(name: str, tests: Iterable[str]) -> bool:
-    return any(name.startswith((f"{test}::", f"{test}/") if "::" not in test else test) for test in tests)
+    return any(
+        name.startswith((f"{test}::", f"{test}/") if "::" not in test else test) for test in tests
+    )

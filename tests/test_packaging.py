@@ -1,4 +1,4 @@
-"""What is released: everything in the sdist, wheels for all Pythons, citation and limits that agree."""
+"""What is released: a complete sdist, one wheel for all Pythons, extras and citation that agree."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ from modeling.extras import CONSOLE_BEFORE, Extra
 from modeling.rendering import compiled
 
 ROOT = Path(__file__).parent.parent
+ROOMS = ("modeling", "stimuli", "rig", "experiments", "analysis", "benches", "tactileq")
+HIDDEN = ("psychopy", "pyglet", "sounddevice", "serial", "plotly", "distributed")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 
@@ -67,12 +69,11 @@ def test_the_core_needs_none_of_what_extras_install(tmp_path: Path) -> None:
     lines = "\n".join(
         (
             "import sys, pkgutil, importlib",
-            "for hidden in ('psychopy', 'pyglet', 'sounddevice', 'serial', 'plotly', 'distributed'):",
+            f"for hidden in {HIDDEN}:",
             "    sys.modules[hidden] = None",
             "from modeling.extras import MissingExtra",
             "refused = []",
-            "rooms = ('modeling', 'stimuli', 'rig', 'experiments', 'analysis', 'benches', 'tactileq')",
-            "for room in map(importlib.import_module, rooms):",
+            f"for room in map(importlib.import_module, {ROOMS}):",
             "    for module in pkgutil.walk_packages(room.__path__, f'{room.__name__}.'):",
             "        if module.name != 'tactileq.__main__':",
             "            try: importlib.import_module(module.name)",

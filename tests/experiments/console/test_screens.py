@@ -46,13 +46,6 @@ def test_a_window_fits_its_screen(screen: tuple[int, int], size: tuple[int, int]
     assert screens.size_within((1280, 800), screen) == size
 
 
-def test_without_psychopy_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not a screen, which no graphical session would bring."""
-    monkeypatch.setitem(sys.modules, "psychopy", None)
-    with refused(InputError, expected="PsychoPy", got=["psychopy", "pip install psychopy"]):
-        screens.open_window(size=(1024, 768), fullscreen=False, screen=0)
-
-
 def apart(a: Box, b: Box) -> bool:
     return a[2] <= b[0] + 1 or b[2] <= a[0] + 1 or a[3] <= b[1] + 1 or b[3] <= a[1] + 1
 
