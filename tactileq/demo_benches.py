@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from tactileq.printing import progress
 
 if TYPE_CHECKING:
-    from analysis.page.sections import Section
-    from analysis.textures.compared import Mapped
+    from analysis.page.sections import Mapped, Section
     from analysis.textures.results import TextureResult
     from benches.atlas.edges import Examined
     from benches.chart.judging import Judged

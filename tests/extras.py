@@ -41,7 +41,10 @@ NEEDING = {
         "rig/hand/test_serial_sensor.py",
         "rig/live/test_hand.py",
     ),
-    "plotly": ("end_to_end/test_bench_chart.py",),
+    "plotly": (
+        "end_to_end/test_bench_chart.py",
+        "benches/chart/test_chart.py::test_the_page",
+    ),
     "distributed": ("end_to_end/test_power_command.py::test_dask",),
     "importlinter": ("test_rooms.py",),
     "bids_validator_deno": ("experiments/sessions/test_bids.py::test_the_validator",),

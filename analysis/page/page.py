@@ -38,6 +38,10 @@ nav a { color: var(--blue); text-decoration: none; margin-right: 22px; white-spa
 nav a:hover { text-decoration: underline; }
 section { background: var(--paper); border: 1px solid var(--line); border-radius: 10px;
           padding: 26px 30px; margin: 26px 0; }
+.points li { font-size: 17px; line-height: 1.4; }
+.front .caution { grid-column: 1 / -1; }
+.front { display: grid; grid-template-columns: repeat(auto-fit, minmax(420px, 1fr)); gap: 0 34px; }
+details.supplement { margin-top: 22px; }
 .tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(205px, 1fr)); gap: 14px; }
 .tile { border: 1px solid var(--line); border-radius: 8px; padding: 14px 16px; }
 .tile b { display: block; font-size: 23px; line-height: 1.25; white-space: nowrap;
@@ -79,6 +83,27 @@ footer { max-width: 1240px; margin: 0 auto 40px; padding: 0 28px; color: var(--s
   figure.tall, h2:has(+ figure.tall) { page: upright; }
   figure.tall img { max-height: 240mm; }
   .scroll { overflow: visible; }
+  /* A report is read upright; its supplement is a file of its own, with wide tables. */
+  body.report { page: upright; font-size: 9.5pt; line-height: 1.4; }
+  body.report details.supplement { display: none; }
+  body.report section { break-inside: avoid; margin: 0 0 9mm; }
+  /* The first page, with the header: one sheet. */
+  body.report #overview { break-inside: auto; break-after: page; margin: 0; }
+  body.report #overview > h2 { display: none; }
+  body.report #overview img { max-height: 66mm; }
+  body.report #overview figcaption { font-size: 7.5pt; line-height: 1.25; }
+  body.report .caution { margin-top: 8px; }
+  body.report figure img { max-height: 92mm; max-width: 100%; }
+  body.report figure.tall { page: auto; }
+  body.report h1 { font-size: 17pt; } body.report h2 { font-size: 13pt; margin-bottom: 4px; }
+  body.report h3 { font-size: 10pt; margin: 10px 0 2px; }
+  body.report .answer, body.report .points li { font-size: 10.5pt; margin: 3px 0 5px; }
+  body.report ul { margin: 3px 0 0; } body.report li { margin: 2px 0; }
+  body.report figure { margin: 6px 0; }
+  body.report .front { grid-template-columns: 1fr 1fr 1fr; gap: 0 16px; font-size: 8.5pt; }
+  body.report .tiles { grid-template-columns: repeat(5, 1fr); gap: 6px; }
+  body.report .tile { padding: 4px 7px; } body.report .tile b { font-size: 12pt; }
+  body.report .tile span, body.report .lead { font-size: 8pt; line-height: 1.25; }
   table { width: 100%; font-size: 8pt; }
   .wide table { font-size: 7pt; }
   thead { display: table-header-group; }
@@ -88,7 +113,7 @@ footer { max-width: 1240px; margin: 0 auto 40px; padding: 0 28px; color: var(--s
   td.name { white-space: normal; }
   /* Break within a word only where it would not fit on a line, so that no column is cut. */
   td.long { overflow-wrap: anywhere; }
-  caption, figcaption, p, ul, .answer { max-width: none; }
+  caption, figcaption, p, ul, .answer, .lead { max-width: none; }
   caption, figcaption { font-size: 9pt; }
   /* Unfold folded parts when printing, where the browser supports it without a script. */
   details::details-content { content-visibility: visible; display: block; block-size: auto; }
@@ -154,6 +179,24 @@ def bullets(sentences: Sequence[str]) -> str:
     """A list of plain sentences; nothing where there are none."""
     items = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences)
     return f"<ul>{items}</ul>" if items else ""
+
+
+def headline_html(answer: str, points: Sequence[str]) -> str:
+    """The answer of a page: a sentence, or what several points are about."""
+    listed = "".join(f"<li>{escape(point)}</li>" for point in points)
+    points_html = f'<ul class="points">{listed}</ul>' if points else ""
+    return f'<p class="answer">{escape(answer)}</p>{points_html}'
+
+
+def findings_html(findings: Sequence[str]) -> str:
+    """What a chapter says: its answer, which stands out, and the rest in a list."""
+    first, *rest = findings
+    return f'<p class="answer">{escape(first)}</p>{bullets(rest)}'
+
+
+def supplement_html(summary: str, content: str) -> str:
+    """What opens on a click on the screen, and is printed from a file of its own."""
+    return f'<details class="supplement"><summary>{escape(summary)}</summary>{content}</details>'
 
 
 def grouped(groups: Mapping[str, Sequence[str]]) -> str:
@@ -249,17 +292,34 @@ def _row_html(columns: Columns, values: Sequence[object], *, css: Sequence[str])
 
 
 def page(
-    *, title: str, answer: str, lead: str, banner: str, sections: Sequence[tuple[str, str, str]]
+    *,
+    title: str,
+    answer: str,
+    lead: str,
+    banner: str,
+    sections: Sequence[tuple[str, str, str]],
+    points: Sequence[str] = (),
+    kind: str = "",
 ) -> str:
-    """The whole page from (anchor, heading, HTML) sections; no banner where its text is empty."""
+    """The whole page from (anchor, heading, HTML) sections; no banner where its text is empty.
+
+    Parameters
+    ----------
+    points : sequence of str
+        What `answer` announces.
+    kind : str
+        "report" is printed upright and without its supplements.
+    """
+    kind_html = f' class="{escape(kind)}"' if kind else ""
     links = "".join(f'<a href="#{escape(a)}">{escape(heading)}</a>' for a, heading, _ in sections)
     warning = f'<div class="banner"><div>{escape(banner)}</div></div>' if banner else ""
     body = "".join(section(a, heading, content=html) for a, heading, html in sections)
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<style>{STYLE}</style></head><body>{warning}<header><div><h1>{escape(title)}</h1>"
-        f'<p class="answer">{escape(answer)}</p><p class="lead">{escape(lead)}</p>'
+        f"<style>{STYLE}</style></head><body{kind_html}>{warning}"
+        f"<header><div><h1>{escape(title)}</h1>"
+        f'{headline_html(answer, points)}<p class="lead">{escape(lead)}</p>'
         f"<nav>{links}</nav></div></header>"
         f"<main>{body}</main><script>{UNFOLD_FOR_PRINT}</script></body></html>\n"
     )

@@ -2,32 +2,69 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol, TypeVar
 
 from analysis.page.outcomes import Outcome
 from analysis.page.page import Fold, Item, Picture, Table
 from modeling.files.writing import file_stem
 
 Progress = Callable[[float, str], None]
+Wanted = TypeVar("Wanted")
+Result = TypeVar("Result")
+
+
+class Mapped(Protocol):
+    """Results of a function of each item, in order: `map`, or one that uses several processes."""
+
+    def __call__(
+        self, work: Callable[[Wanted], Result], items: Sequence[Wanted], /
+    ) -> Iterable[Result]: ...
+
+
+@dataclass(frozen=True)
+class Headline:
+    """The answer to the question of a whole report, and what its words mean.
+
+    Parameters
+    ----------
+    subject : str
+        The answer; with points, what they are about.
+    points : tuple of str
+        One for each claim.
+    lead : str
+        What the words mean.
+    """
+
+    subject: str
+    points: tuple[str, ...] = ()
+    lead: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """One part of the report.
+    """A chapter of the report.
 
     Parameters
     ----------
     items : tuple of Table, Picture or Fold
-        In the order of the page.
+        The first picture begins the chapter (without one, the first table); all others are its
+        supplement.
+    answer : str
+        What the chapter says, in one sentence; by default its weightiest finding.
     outcomes : tuple of Outcome
         Findings, computed from the numbers.
+    front : tuple of Picture
+        Pictures for the first page.
     done : tuple of str
         What was done.
     tiles : tuple of (str, str)
         Key figures: value, and what it is.
-    answer, lead : str
-        The sentence that answers the question of the whole report, and what its words mean.
+    headline : Headline, optional
+        The answer to the question of the whole report; the first one counts.
+    reliability, verified : tuple of str
+        For the first page: how reliable the answers are, and what was checked.
     cautions : tuple of str
         What must not be concluded.
     deviations : tuple of str
@@ -35,20 +72,41 @@ class Section:
     methods : str
         The statistical methods, worded for a paper.
 
-    Without items it has no place of its own in the page; its sentences are shown at a glance.
+    Without items it is no chapter; its sentences are on the first page all the same.
     """
 
     anchor: str
     heading: str
     items: tuple[Item, ...]
+    answer: str = ""
     outcomes: tuple[Outcome, ...] = ()
+    front: tuple[Picture, ...] = ()
     done: tuple[str, ...] = ()
     tiles: tuple[tuple[str, str], ...] = ()
-    answer: str = ""
-    lead: str = ""
+    headline: Headline | None = None
+    reliability: tuple[str, ...] = ()
+    verified: tuple[str, ...] = ()
     cautions: tuple[str, ...] = ()
     deviations: tuple[str, ...] = ()
     methods: str = ""
+
+    @property
+    def opening(self) -> Picture | Table | None:
+        """What begins the chapter, below its answer: a picture, or a table that is all it says."""
+        single = [item for item in self.items if not isinstance(item, Fold)]
+        pictures = [item for item in single if isinstance(item, Picture)]
+        return next(iter(pictures or ([] if self.findings else single)), None)
+
+    @property
+    def supplement(self) -> tuple[Item, ...]:
+        """Everything but the opening."""
+        return tuple(item for item in self.items if item is not self.opening)
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """The answer, then the other findings, the weightiest first; none twice."""
+        found = [outcome.sentence for outcome in sorted(self.outcomes, key=lambda o: o.weight)]
+        return tuple(dict.fromkeys([self.answer] * bool(self.answer) + found))
 
 
 def of_task(section: Section, ending: str) -> Section:

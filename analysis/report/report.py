@@ -1,10 +1,10 @@
-"""One self-contained report of a study, with its tables and figures beside it."""
+"""One self-contained report of a study, with its supplement, tables and figures beside it."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import cast
@@ -16,7 +16,6 @@ from analysis.answers.responses import Responses
 from analysis.chapters.chapter import AnswerChapter, Answered, ModelChapter, Modelled
 from analysis.columns import tsv_text
 from analysis.labels import MODELS
-from analysis.page.outcomes import by_weight
 from analysis.page.page import (
     PICTURE_DPI,
     Fold,
@@ -24,22 +23,24 @@ from analysis.page.page import (
     Picture,
     Table,
     bullets,
+    findings_html,
     folded,
-    grouped,
     page,
     paragraph,
     picture_html,
+    supplement_html,
     table_html,
     tiles,
 )
 from analysis.page.provenance import provenance_table
 from analysis.page.saving import missing_fonts, png_of, svg_of
-from analysis.page.sections import Progress, Section
+from analysis.page.sections import Headline, Mapped, Progress, Section
 from analysis.statistics.verdicts import claims_found
-from analysis.textures.compared import Comparison, Mapped, comparisons
+from analysis.textures.compared import Comparison, comparisons
 from analysis.textures.regressions import driving_table
 from analysis.textures.results import TextureResult
 from modeling import InputError
+from modeling.errors import counted
 from modeling.files.writing import write_text
 
 # The chapters in the order of the page: folders of `analysis/chapters`. The generator of a report
@@ -61,6 +62,7 @@ MODEL_CHAPTERS = (
     "parameters",
     "planted",
 )
+SUPPLEMENT_NAME = "supplement.html"
 MODELS_SHARE = 0.4  # of the time that a report of a whole study takes
 PICTURES_SHARE = 0.4
 
@@ -79,12 +81,16 @@ def write_report(
     progress: Progress | None = None,
     mapped: Mapped = map,
 ) -> Path:
-    """Write report.html, and tables/*.tsv, figures/*.png and figures/*.svg beside it.
+    """Write report.html, and supplement.html, tables/ and figures/ (PNG and SVG) beside it.
+
+    The report has a first page and a chapter for each section. What is behind them is folded in the
+    report, and in the supplement, which is printed on its own.
 
     Parameters
     ----------
     path : str or Path
-        The report's file, which is self-contained; folders are created as needed.
+        The report's file, which is self-contained as its supplement is; folders are created as
+        needed.
     responses : Responses, optional
         Answers of the study; without them the report covers the models alone.
     textures : sequence of TextureResult, optional
@@ -127,7 +133,7 @@ def write_report(
     if responses is not None:
         answered = Answered(
             responses=responses,
-            found=claims_found(responses, rng=rng),
+            found=claims_found(responses, rng=rng, mapped=mapped),
             rng=rng,
             seed=seed,
             hand=hand,
@@ -145,7 +151,9 @@ def write_report(
         raise InputError(
             "expected answers or models to report on, got neither; run a session or fit a model."
         )
-    pictures = _pictures([item for section in sections for item in section.items])
+    pictures = _pictures(
+        [item for section in sections for item in (*section.front, *section.items)]
+    )
     drawn = mapped(_drawn, pictures)
     facts = {**(provenance or {}), "seed of this report": seed}
     files = _Files(target.parent)
@@ -153,26 +161,30 @@ def write_report(
         share = 1 - PICTURES_SHARE * (1 - number / len(pictures))
         report_progress(share, f"drawing {picture.title}")
         files.add_picture(picture, formats, lacking=lacking)
-    shown = [(s.anchor, s.heading, files.html(s.items)) for s in sections if s.items]
     undrawn = missing_fonts("".join(sorted(files.lacking)))
-    methods = "".join(
-        paragraph("Statistical methods, for a paper", section.methods)
-        for section in sections
-        if section.methods
-    )
-    answer, lead = _answer(sections)
+    headline = next((s.headline for s in sections if s.headline), Headline(""))
+    banner = _banner(responses, textures)
+    chapters = [_Chapter.of(section, files) for section in sections if section.items]
+    chapters.append(_origin(sections, facts, files=files, undrawn=undrawn))
+    overview = ("overview", "At a glance", _overview(sections, files, real=not banner))
     html = page(
         title=title,
-        answer=answer,
-        lead=lead,
-        banner=_banner(responses, textures),
-        sections=[
-            ("overview", "At a glance", _overview(sections, undrawn=undrawn)),
-            *shown,
-            ("origin", "Methods and provenance", methods + files.html([provenance_table(facts)])),
-        ],
+        answer=headline.subject,
+        points=headline.points,
+        lead=headline.lead,
+        banner=banner,
+        sections=[overview, *(chapter.whole() for chapter in chapters)],
+        kind="report",
+    )
+    behind = page(
+        title=f"Supplement: {title}",
+        answer="Tables and pictures behind the chapters of the report.",
+        lead="",
+        banner=banner,
+        sections=[(c.anchor, c.heading, c.supplement) for c in chapters if c.supplement],
     )
     write_text(target, html)
+    write_text(target.with_name(SUPPLEMENT_NAME), behind)
     if undrawn:
         warnings.warn(undrawn, stacklevel=2)
     report_progress(1.0, "done")
@@ -184,10 +196,65 @@ def _sections_of(name: str) -> object:
     return import_module(f"analysis.chapters.{name}.section").sections
 
 
-def _answer(sections: Sequence[Section]) -> tuple[str, str]:
-    """The first answer that a section gives, and what stands below it."""
-    answers = ((section.answer, section.lead) for section in sections if section.answer)
-    return next(answers, ("", ""))
+@dataclass(frozen=True)
+class _Chapter:
+    """A chapter of the page; `opening` and `supplement` are HTML."""
+
+    anchor: str
+    heading: str
+    opening: str
+    supplement: str
+    behind: str  # what the supplement holds
+
+    @classmethod
+    def of(cls, section: Section, files: _Files) -> _Chapter:
+        """A section whose pictures were added to the files; its tables are written."""
+        opening = [section.opening] if section.opening else []
+        html = findings_html(section.findings) if section.findings else ""
+        return cls(
+            section.anchor,
+            section.heading,
+            opening=html + files.html(opening),
+            supplement=files.html(section.supplement),
+            behind=_counted(section.supplement),
+        )
+
+    def whole(self) -> tuple[str, str, str]:
+        """As the report shows it, the supplement folded."""
+        folded_in = supplement_html(f"Supplement: {self.behind}", self.supplement)
+        return self.anchor, self.heading, self.opening + folded_in * bool(self.supplement)
+
+
+def _counted(items: Sequence[Item]) -> str:
+    """How many tables and pictures there are: `3 tables, 1 picture`."""
+    pictures = len(_pictures(items))
+    singles = [
+        each for item in items for each in (item.items if isinstance(item, Fold) else [item])
+    ]
+    tables = len(singles) - pictures
+    found = ((tables, "table"), (pictures, "picture"))
+    return ", ".join(counted(number, noun) for number, noun in found if number)
+
+
+def _origin(
+    sections: Sequence[Section], facts: Mapping[str, object], *, files: _Files, undrawn: str
+) -> _Chapter:
+    """What was done, the methods for a paper, and the provenance."""
+    done = list(dict.fromkeys(sentence for section in sections for sentence in section.done))
+    done += [f"While drawing the figures: {undrawn}"] * bool(undrawn)
+    methods = "".join(
+        paragraph("Statistical methods, for a paper", section.methods)
+        for section in sections
+        if section.methods
+    )
+    provenance = provenance_table(facts)
+    return _Chapter(
+        "origin",
+        "Methods and provenance",
+        opening="<h3>What was done</h3>" + bullets(done),
+        supplement=methods + files.html([provenance]),
+        behind="statistical methods, for a paper; " * bool(methods) + _counted([provenance]),
+    )
 
 
 def _modelled(
@@ -216,25 +283,30 @@ def _with_identical(responses: Responses, textures: Sequence[TextureResult]) -> 
     return replace(responses, equal=equal)
 
 
-def _overview(sections: Sequence[Section], *, undrawn: str) -> str:
-    outcomes = [outcome for section in sections for outcome in section.outcomes]
+def _overview(sections: Sequence[Section], files: _Files, *, real: bool) -> str:
+    """The first page below its answer: who, pictures, and what bears on the answer."""
     # An unfinished task is reported in its own section and in the one on the verdicts.
     tiles_once = list(dict.fromkeys(tile for section in sections for tile in section.tiles))
-    done = list(dict.fromkeys(sentence for section in sections for sentence in section.done))
-    done += [f"While drawing the figures: {undrawn}"] * bool(undrawn)
+    verified = [sentence for section in sections for sentence in section.verified]
+    verified += ["Nothing is simulated: people, rig and recordings are real."] * real
     warned = [sentence for section in sections for sentence in section.cautions]
-    otherwise = [sentence for section in sections for sentence in section.deviations]
-    planned = "<h3>Exclusions, and deviations from the plan</h3>" + bullets(otherwise)
+    caution = f'<div class="caution"><h3>What must not be concluded</h3>{bullets(warned)}</div>'
+    below = {
+        "Exclusions, and deviations from the plan": [
+            sentence for section in sections for sentence in section.deviations
+        ],
+        "Reliability": [sentence for section in sections for sentence in section.reliability],
+        "What was verified": verified,
+    }
+    columns = "".join(
+        f"<div><h3>{heading}</h3>{bullets(sentences)}</div>"
+        for heading, sentences in below.items()
+        if sentences
+    )
     return (
         tiles(tiles_once)
-        + "<h3>Findings</h3>"
-        + grouped(by_weight(outcomes))
-        + '<div class="caution"><h3>What must not be concluded</h3>'
-        + bullets(warned)
-        + "</div>"
-        + planned * bool(otherwise)
-        + "<h3>What was done</h3>"
-        + bullets(done)
+        + files.html([picture for section in sections for picture in section.front])
+        + f'<div class="front">{columns}{caution * bool(warned)}</div>'
     )
 
 

@@ -5,7 +5,10 @@ docs/method/statistics.md#verdicts
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,7 +16,8 @@ from scipy import stats
 
 from analysis.answers.plan import MODEL_RULE, AnalysisPlan, Claim
 from analysis.answers.responses import Responses
-from analysis.labels import SCALES
+from analysis.labels import ALL_TEXTURES, SCALES
+from analysis.page.sections import Mapped
 from analysis.statistics.caveats import NOT_TESTED, SHOWN, Caveats
 from analysis.statistics.claims import claim_tests, with_people
 from analysis.statistics.compared_answers import (
@@ -41,6 +45,8 @@ from modeling.arrays import Floats
 from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.seeds import number_of
 
+Row = Mapping[Hashable, Any]
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ClaimFound:
@@ -66,13 +72,24 @@ class ClaimFound:
     few: float = AnalysisPlan.few
 
 
-def claims_found(responses: Responses, *, rng: np.random.Generator) -> list[ClaimFound]:
+def overall_row(found: ClaimFound) -> Row | None:
+    """The row over all textures; None where all models are identical."""
+    rows = found.tests[found.tests["texture"] == ALL_TEXTURES].to_dict("records")
+    return rows[0] if rows else None
+
+
+def claims_found(
+    responses: Responses, *, rng: np.random.Generator, mapped: Mapped = map
+) -> list[ClaimFound]:
     """Every claim of the plan, then an exploratory one of each measure that no claim is about.
 
     Parameters
     ----------
     rng : Generator
-        Draws sign flips.
+        Draws sign flips, and seeds the draws from the posterior.
+    mapped : callable
+        How the samplers of several claims are run: `map`, or one that uses several processes. It
+        changes no result.
 
     Returns
     -------
@@ -81,12 +98,15 @@ def claims_found(responses: Responses, *, rng: np.random.Generator) -> list[Clai
     """
     found = []
     own = generators(rng)
-    for claim in all_claims(responses):
+    claims = all_claims(responses)
+    samplers = [_sampler_of(responses, claim, rng=rng) for claim in claims]
+    sampled = iter(mapped(_called, [sampler for sampler in samplers if sampler is not None]))
+    for claim, sampler in zip(claims, samplers, strict=True):
         values = claim_values(responses, claim)
         caveats = claim_caveats(responses, claim, rng=own[claim.task])
         tests = claim_tests(claim, values, caveats=caveats, rng=own[claim.task])
         few = responses.plan.few
-        people = None if caveats.unfinished else claim_people(responses, claim, rng=rng)
+        people = None if sampler is None else next(sampled)
         if people is not None:
             tests = with_people(tests, people, claim, caveats=caveats, few=few)
         found.append(
@@ -102,21 +122,18 @@ def claims_found(responses: Responses, *, rng: np.random.Generator) -> list[Clai
     return found
 
 
-def claim_people(
+def _sampler_of(
     responses: Responses, claim: Claim, *, rng: np.random.Generator
-) -> PeopleFound | None:
-    """What the model of the participants says of a claim; None where it does not decide.
-
-    Parameters
-    ----------
-    rng : Generator
-        Seeds the draws from the posterior.
-    """
+) -> Callable[[], PeopleFound] | None:
+    """What draws from the posterior of a claim; None where the model does not decide it."""
+    if claim.task in responses.unfinished:
+        return None
     data = people_data(responses, claim)
     if data is None or claim.bounds is None:
         return None
     own = np.random.default_rng([int(rng.integers(2**32)), number_of(claim.name)])
-    return people_found(
+    return partial(
+        people_found,
         data.studies,
         claim.bounds,
         model=data.model,
@@ -124,6 +141,11 @@ def claim_people(
         textures=data.textures,
         rng=own,
     )
+
+
+def _called(sampler: Callable[[], PeopleFound]) -> PeopleFound:
+    """What it draws; by name, so that another process can be sent it."""
+    return sampler()
 
 
 def people_data(responses: Responses, claim: Claim) -> PeopleData | None:

@@ -2,27 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
 
 import numpy as np
 import pandas as pd
 
+from analysis.page.sections import Mapped
 from analysis.textures.likeness import condition_targets, gfc_table
 from analysis.textures.regressions import driven_table
 from analysis.textures.results import TextureResult
-
-Item = TypeVar("Item")
-Result = TypeVar("Result")
-
-
-class Mapped(Protocol):
-    """Results of a function of each item, in order: `map`, or one that uses several processes."""
-
-    def __call__(
-        self, work: Callable[[Item], Result], items: Sequence[Item], /
-    ) -> Iterable[Result]: ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -19,11 +21,13 @@ from analysis.page.drawing import (
     SKY_BLUE,
     VERMILLION,
     axes_or_new,
+    finish_axes,
+    shared_legend,
     stamp_if_simulated,
 )
 from benches.atlas.case import DEGRADES, FAILS, HOLDS, VERDICTS, Axis, Case
 from benches.atlas.edges import Examined
-from benches.atlas.tables import theory_of
+from benches.atlas.tables import LEAST_MARGIN, theory_of
 
 COLOURS = {HOLDS: BLUE, DEGRADES: ORANGE, FAILS: VERMILLION}
 BARS = {HOLDS: SKY_BLUE, DEGRADES: ORANGE, FAILS: VERMILLION}
@@ -71,6 +75,41 @@ def figure_atlas(examined: Sequence[Examined], *, columns: int = COLUMNS) -> Fig
         fontsize=9,
         color=GREY,
     )
+    return figure
+
+
+def figure_margins(margins: pd.DataFrame, *, most: int = 20) -> Figure:
+    """The defaults that are nearest to an edge, by the factor between them and the edge.
+
+    Parameters
+    ----------
+    margins : DataFrame
+        `tables.margin_table`; at least one row.
+    most : int
+        Rows that are drawn.
+    """
+    near = margins.sort_values("margin", kind="stable").head(most).iloc[::-1]
+    figure = Figure(figsize=(9.0, 1.3 + 0.21 * len(near)), layout="constrained")
+    ax = figure.subplots()
+    ax.axvspan(1.0, LEAST_MARGIN, color=GREY, alpha=0.15, lw=0)
+    ax.axvline(1.0, color=BLACK, lw=0.8)
+    styles = {True: ("o", BLUE, "far enough"), False: ("X", VERMILLION, "too near, or beyond")}
+    for enough, (mark, colour, label) in styles.items():
+        which = np.flatnonzero(near["enough"].to_numpy(dtype=bool) == enough)
+        values = near["margin"].to_numpy(dtype=float)[which]
+        ax.hlines(which, 1.0, values, color=colour, lw=1.2)
+        ax.plot(values, which, mark, color=colour, ms=6, ls="", label=label)
+    words = near["method"] + ": " + near["axis"] + " (" + near["family"] + ")"
+    ax.set_yticks(range(len(near)), list(words), fontsize=8)
+    ax.set_ylim(-0.7, len(near) - 0.3)
+    ax.set_xscale("log")
+    ax.xaxis.set_major_formatter("{x:g}")
+    ax.xaxis.set_minor_formatter("{x:g}")
+    ax.tick_params(axis="x", which="both", labelsize=8)
+    ax.set_xlabel(f"factor from the default to the nearest edge (grey: below {LEAST_MARGIN:g})")
+    finish_axes(ax)
+    shared_legend(figure, [ax])
+    stamp_if_simulated(ax, True)
     return figure
 
 

@@ -27,7 +27,7 @@ from analysis.page.saving import png_of, svg_of, warn_of_missing_fonts
 from analysis.page.sections import Section
 from benches.atlas.cases import TO_COME
 from benches.atlas.edges import Examined
-from benches.atlas.figure import figure_atlas
+from benches.atlas.figure import figure_atlas, figure_margins
 from benches.atlas.tables import (
     CELL_COLUMNS,
     EDGE_COLUMNS,
@@ -39,8 +39,14 @@ from benches.atlas.tables import (
 )
 from modeling.errors import counted
 from modeling.files.columns import chosen, names, without
+from modeling.files.writing import file_stem
 
 BANNER = "SIMULATED: every run uses simulated signals, hand movements, recordings and answers."
+ATLAS_NOTE = (
+    "A row per method, a mark per run. Bars change colour at the edges, which were located by "
+    "bisection starting at the easy end (left). Black: how far theory expects a method to "
+    "hold. Dashed: the default of the program, or a typical hand movement."
+)
 UNEXPLAINED = (
     "unexplained, unless by the limited resolution of the edges (see the caption of the table)"
 )
@@ -61,15 +67,6 @@ SHOWN_CELLS = without(CELL_COLUMNS, "simulated")
 def stability_section(examined: Sequence[Examined]) -> Section:
     """Where methods hold, degrade and fail, and how far our defaults are from the edges."""
     margins, edges = margin_table(examined), edge_table(examined)
-    picture = Picture(
-        "stability",
-        "Where methods hold, degrade and fail",
-        "A row per method, a mark per run. Bars change colour at the edges, which were located by "
-        "bisection starting at the easy end (left). Black: how far theory expects a method to "
-        "hold. Dashed: the default of the program, or a typical hand movement.",
-        figure_atlas(examined),
-        simulated=True,
-    )
     near = Table(
         "stability_margins",
         "How far our defaults are from the nearest edge",
@@ -94,9 +91,45 @@ def stability_section(examined: Sequence[Examined]) -> Section:
     return Section(
         "stability",
         "Where methods fail",
-        (picture, near, Fold("All edges, measured and expected by theory", (every,))),
+        (
+            *_nearest(margins),
+            near,
+            Fold("All edges, measured and expected by theory", (every,)),
+            Fold("Where methods hold, degrade and fail, family by family", _families(examined)),
+        ),
         outcomes=tuple(_outcomes(margins, edges)),
         done=tuple(f"Not in the atlas yet: {name}, {why}." for name, why in TO_COME.items()),
+    )
+
+
+def _nearest(margins: pd.DataFrame) -> tuple[Picture, ...]:
+    if margins.empty:
+        return ()
+    picture = Picture(
+        "stability_margins",
+        "The defaults nearest to an edge",
+        "The factor by which the nearest edge is more severe than the default of the program, or a "
+        "typical hand movement; left of 1 the default lies beyond its edge.",
+        figure_margins(margins),
+        simulated=True,
+    )
+    return (picture,)
+
+
+def _families(examined: Sequence[Examined]) -> tuple[Picture, ...]:
+    """A picture of each family of methods, which paper can show."""
+    families: dict[str, list[Examined]] = {}
+    for one in examined:
+        families.setdefault(one.case.family, []).append(one)
+    return tuple(
+        Picture(
+            file_stem(f"stability_{family}"),
+            f"Where methods hold, degrade and fail: {family}",
+            ATLAS_NOTE,
+            figure_atlas(own, columns=2),
+            simulated=True,
+        )
+        for family, own in families.items()
     )
 
 
@@ -133,25 +166,35 @@ def _outcomes(margins: pd.DataFrame, edges: pd.DataFrame) -> list[Outcome]:
 def atlas_files(examined: Sequence[Examined], provenance: Mapping[str, object]) -> dict[str, bytes]:
     """The whole atlas by file name: tables, picture, and a page with all of it."""
     section = stability_section(examined)
-    picture = section.items[0]
-    assert isinstance(picture, Picture)
-    png, lacking = png_of(picture.figure, dpi=PICTURE_DPI)
+    atlas = Picture(
+        "stability",
+        "Where methods hold, degrade and fail",
+        ATLAS_NOTE,
+        figure_atlas(examined),
+        simulated=True,
+    )
+    png, lacking = png_of(atlas.figure, dpi=PICTURE_DPI)
     warn_of_missing_fonts(lacking)
     tables = {
         "cells.tsv": cell_table(examined),
         "edges.tsv": edge_table(examined),
         "margins.tsv": margin_table(examined),
     }
-    html = _page(section, png, cells=tables["cells.tsv"], provenance=provenance)
+    html = _page(section, atlas, png, cells=tables["cells.tsv"], provenance=provenance)
     return {name: table_bytes(table) for name, table in tables.items()} | {
         "atlas.png": png,
-        "atlas.svg": svg_of(picture.figure)[0],
+        "atlas.svg": svg_of(atlas.figure)[0],
         "atlas.html": html.encode(),
     }
 
 
 def _page(
-    section: Section, png: bytes, *, cells: pd.DataFrame, provenance: Mapping[str, object]
+    section: Section,
+    atlas: Picture,
+    png: bytes,
+    *,
+    cells: pd.DataFrame,
+    provenance: Mapping[str, object],
 ) -> str:
     runs = Table("cells", "Every run", "All marks of the picture.", cells, SHOWN_CELLS, True)
     origin = Table(
@@ -163,7 +206,13 @@ def _page(
         simulated=False,
     )
     outcomes = [outcome.sentence for outcome in section.outcomes]
-    items = (*section.items, Fold("Every run", (runs,)))
+    tables = [item for item in section.items if isinstance(item, Table)]
+    folds = [
+        item
+        for item in section.items
+        if isinstance(item, Fold) and not any(isinstance(each, Picture) for each in item.items)
+    ]
+    shown: list[Item] = [atlas, *tables, *folds, Fold("Every run", (runs,))]
     return page(
         title="Where do methods fail?",
         answer=outcomes[0] if outcomes else "No default was examined.",
@@ -171,7 +220,7 @@ def _page(
         banner=BANNER,
         sections=[
             ("overview", "At a glance", bullets([*outcomes[1:], *section.done])),
-            (section.anchor, section.heading, "".join(_item_html(item, png) for item in items)),
+            (section.anchor, section.heading, "".join(_item_html(item, png) for item in shown)),
             ("origin", "Provenance", table_html(origin)),
         ],
     )

@@ -7,9 +7,11 @@ from collections.abc import Iterable
 from html import escape
 from importlib import resources
 
+import numpy as np
 import pandas as pd
 
 from analysis.columns import table_bytes
+from analysis.page.outcomes import described
 from analysis.page.page import (
     PICTURE_DPI,
     Picture,
@@ -25,13 +27,15 @@ from analysis.page.sections import Section
 from benches.chart.chart import Chart
 from benches.chart.figure import STYLES, figure_chart
 from benches.chart.judging import PLACES
+from benches.chart.methods import OUR_METHOD
 from benches.chart.summary import (
     METHOD_COLUMNS,
     RIVAL_COMPARISON_COLUMNS,
     comparison_table,
     default_rows,
 )
-from benches.chart.surfaces import SURFACE_KINDS, counted_kind
+from benches.chart.surfaces import SURFACE_KINDS, Kind, counted_kind
+from modeling.errors import counted
 from modeling.extras import extra
 from modeling.files.columns import names, without
 
@@ -156,10 +160,30 @@ def chart_section(chart: Chart) -> Section:
         "chart",
         "Speed against accuracy",
         (*chart_pictures(chart), *chart_tables(chart)),
+        outcomes=tuple(described(_in_short(chart, kind) for kind in chart.kinds)),
         done=(
             f"{_counted(chart)} were modelled by {chart.rows['method'].nunique()} methods, each "
             "rendered in several ways and compared with the truth.",
         ),
+    )
+
+
+def _in_short(chart: Chart, kind: Kind) -> str:
+    """How many rivals are cheaper than our default, and how many nearer to the truth."""
+    found = [one for one in chart.comparisons if one.kind == kind]
+    cost = {one.rival: one.ratios["operations"].mean for one in found}
+    place = "between" if np.isnan(found[0].ratios["stroking"].mean) else "stroking"
+    distance = {one.rival: one.ratios[place].mean for one in found}
+    where = {"between": "between the conditions", "stroking": "during strokes"}[place]
+    cheaper = [rival for rival in cost if cost[rival] < 1]
+    nearer = [rival for rival in distance if distance[rival] < 1]
+    nearest = min(distance, key=lambda rival: distance[rival])
+    named = f" ({', '.join(nearer)})" if nearer else ""
+    return (
+        f"On {SURFACE_KINDS[kind]}: {len(cheaper)} of {counted(len(found), 'rival')} need fewer "
+        f"operations than {OUR_METHOD}, and {len(nearer)}{named} come nearer to the truth {where}; "
+        f"the nearest, {nearest}, has {distance[nearest]:.2f} times the distance for "
+        f"{cost[nearest]:.2f} times the operations."
     )
 
 

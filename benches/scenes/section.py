@@ -27,6 +27,7 @@ from benches.scenes.examples import (
     comparison_table,
 )
 from modeling import CompiledScene
+from modeling.errors import counted
 from modeling.files.columns import Column, chosen
 
 SCENE = Column("scene", is_name=True)
@@ -136,18 +137,36 @@ def _tables_by_scene(
 
 
 def _outcomes(comparison: pd.DataFrame) -> list[Outcome]:
-    sentences = []
-    for scene, rows in comparison.groupby("scene", sort=False):
-        full, least, rival = (rows[rows["method"] == m].iloc[0] for m in (FULL_MODEL, LEAST, RIVAL))
-        sentences.append(
-            f"Scene {scene}: the least models need {least['numbers'] / full['numbers']:.0%} of the "
-            f"numbers of the full ones ({least['numbers']} instead of {full['numbers']}), "
-            f"{least['bytes'] / full['bytes']:.0%} of the bytes and "
-            f"{least['operations'] / full['operations']:.0%} of the operations; the bound was kept "
-            f"in {least['windows']} seconds of random strokes. {RIVAL} needs "
-            f"{rival['numbers'] / least['numbers']:.1f} times the numbers of the least models; its "
-            f"GFC30 relative to the true surface is {rival['gfc30']:.3f} (least models "
-            f"{least['gfc30']:.3f}), its error in nine bands {rival['bands_db']:.2f} dB (least "
-            f"models {least['bands_db']:.2f} dB)."
+    """What the least models of all scenes need, and how near they and the rival come."""
+    by_method = {
+        method: rows.set_index("scene") for method, rows in comparison.groupby("method", sort=False)
+    }
+    full, least, rival = (by_method[method] for method in (FULL_MODEL, LEAST, RIVAL))
+    needed = ", ".join(
+        f"{_range(least[cost] / full[cost], '.0%')} of the {cost}"
+        for cost in ("numbers", "bytes", "operations")
+    )
+    kept, looked = (
+        sum(int(text.split(" of ")[place]) for text in least["windows"]) for place in (0, 1)
+    )
+    nearness = "; ".join(
+        f"{words} {_range(rival[name], form)} (least models {_range(least[name], form)})"
+        for name, words, form in (
+            ("bands_db", "error in nine bands in dB", ".2f"),
+            ("gfc30", "GFC30", ".3f"),
         )
-    return described(sentences)
+    )
+    return described(
+        [
+            f"In {counted(len(least), 'scene')} the least models need {needed} of the full ones; "
+            f"the bound was kept in {kept} of {looked} seconds of random strokes.",
+            f"{RIVAL} needs {_range(rival['numbers'] / least['numbers'], '.1f')} times the numbers "
+            f"of the least models; relative to the true surface: {nearness}.",
+        ]
+    )
+
+
+def _range(values: pd.Series, form: str) -> str:
+    """The smallest and the largest of the scenes."""
+    low, high = (format(float(end), form) for end in (values.min(), values.max()))
+    return low if low == high else f"{low} to {high}"

@@ -17,8 +17,7 @@ from tactileq.printing import progress, share_of
 from tactileq.workers import mapping
 
 if TYPE_CHECKING:
-    from analysis.page.sections import Section
-    from analysis.textures.compared import Mapped
+    from analysis.page.sections import Mapped, Section
     from analysis.textures.results import TextureResult
     from experiments.observers.psychometrics import Psychometrics
     from modeling import ARModel, Threshold

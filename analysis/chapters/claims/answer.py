@@ -1,4 +1,4 @@
-"""The answer to the report's question: one sentence, computed from the verdicts."""
+"""The answer to the report's question, claim by claim, computed from the verdicts."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from analysis.chapters.claims.people_sentences import headline
 from analysis.chapters.claims.sentences import (
     by_verdict,
     difference,
-    overall_row,
 )
-from analysis.labels import MEASURES, TASK_TITLES
+from analysis.labels import MEASURES, TASK_TITLES, sentence_case
+from analysis.page.sections import Headline
 from analysis.statistics.caveats import (
     BOUNDS_WITHHELD,
     DIFFERENCES,
@@ -21,7 +21,7 @@ from analysis.statistics.caveats import (
 )
 from analysis.statistics.claims import NO_TEST
 from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE, WITHIN_BOUNDS
-from analysis.statistics.verdicts import ClaimFound
+from analysis.statistics.verdicts import ClaimFound, overall_row
 
 WORDS = {
     EQUIVALENT: "equivalent in",
@@ -41,8 +41,8 @@ IDENTICAL = "Nothing to compare: the models of all textures are identical."
 NO_BOUNDS = "no difference was shown, and without bounds equivalence cannot be tested, in"
 
 
-def answer(found: Sequence[ClaimFound], responses: Responses) -> str:
-    """Can anybody feel the difference? One sentence with intervals; empty without answers.
+def answer(found: Sequence[ClaimFound], responses: Responses) -> Headline | None:
+    """Can anybody feel the difference? A point with intervals for each claim; None without answers.
 
     Planned claims alone, where there are some.
 
@@ -52,16 +52,17 @@ def answer(found: Sequence[ClaimFound], responses: Responses) -> str:
         Who answered, and where.
     """
     if all(table.empty for table in responses.answers.values()):
-        return ""
+        return None
     if not found:
-        return NOTHING_TO_CLAIM
+        return Headline(NOTHING_TO_CLAIM)
     asked = [one for one in found if one.claim.planned] or list(found)
     parts = _parts(asked)
     if not parts:
-        return IDENTICAL if all(one.caveats.identical for one in asked) else NOTHING_ANSWERED
-    differing = _differing_textures(asked)
-    sentence = f"{_circumstances(responses)}{_subject(asked)}: {'; '.join(parts)}{differing}."
-    return f"{sentence[0].upper()}{sentence[1:]}"
+        identical = all(one.caveats.identical for one in asked)
+        return Headline(IDENTICAL if identical else NOTHING_ANSWERED)
+    points = [*parts, *_differing_textures(asked)]
+    subject = f"{_circumstances(responses)}{_subject(asked)}:"
+    return Headline(sentence_case(subject), tuple(f"{sentence_case(point)}." for point in points))
 
 
 def unfinished_tasks(responses: Responses) -> list[str]:
@@ -132,7 +133,7 @@ def _what(one: ClaimFound, found: Sequence[ClaimFound]) -> str:
     return f"the {what}" if claim.measure == "correct" else what
 
 
-def _differing_textures(found: Sequence[ClaimFound]) -> str:
+def _differing_textures(found: Sequence[ClaimFound]) -> list[str]:
     """Single textures whose models differ, whatever the mean over textures."""
     named = {}
     for one in found:
@@ -140,7 +141,5 @@ def _differing_textures(found: Sequence[ClaimFound]) -> str:
         rows = [row for verdict in DIFFERENCES for row in groups.get(verdict, [])]
         if rows:
             named[_what(one, found)] = ", ".join(sorted(str(row["texture"]) for row in rows))
-    if not named:
-        return ""
     shown = "; ".join(f"{textures} ({what})" for what, textures in named.items())
-    return f"; single textures that differ: {shown}"
+    return [f"single textures that differ: {shown}"] * bool(named)

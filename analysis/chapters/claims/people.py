@@ -11,10 +11,9 @@ import pandas as pd
 
 from analysis.chapters.claims.people_figure import figure_people
 from analysis.chapters.claims.people_sentences import verdict_of_doubled
-from analysis.chapters.claims.sentences import overall_row
 from analysis.page.page import Fold, Item, Picture, Table
 from analysis.statistics.participants.verdict import PEOPLE_COLUMNS, PeopleSummary
-from analysis.statistics.verdicts import ClaimFound
+from analysis.statistics.verdicts import ClaimFound, overall_row
 from modeling.files.columns import Column, names
 from modeling.files.writing import file_stem
 

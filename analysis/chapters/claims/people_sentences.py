@@ -5,9 +5,6 @@ docs/method/participants.md#verdict
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
-from typing import Any
-
 from analysis.labels import sentence_case, signed, unit_of
 from analysis.statistics.caveats import BOUNDS_WITHHELD, WITHHELD
 from analysis.statistics.equivalence import (
@@ -20,10 +17,9 @@ from analysis.statistics.equivalence import (
     WITHIN_BOUNDS,
 )
 from analysis.statistics.participants.verdict import LIKELY, PeopleFound
-from analysis.statistics.verdicts import ClaimFound
+from analysis.statistics.verdicts import ClaimFound, Row
 from modeling.errors import counted
 
-Row = Mapping[Hashable, Any]
 HIGHEST_R_HAT = 1.05
 WORTH_A_WORD = 0.05  # share of lapsed trials, or of ratings at an end, that may part two verdicts
 MOST_NAMED = 6

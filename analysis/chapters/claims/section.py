@@ -15,9 +15,10 @@ from analysis.chapters.claims.people import people_items
 from analysis.chapters.claims.people_sentences import FEEL_IT
 from analysis.chapters.claims.plan_sentences import deviations, methods_paragraph
 from analysis.chapters.claims.sentences import claim_outcomes
+from analysis.labels import sentence_case
 from analysis.page.page import Fold, Picture, Table
 from analysis.page.sections import Section
-from analysis.statistics.claims import CLAIM_COLUMNS, VERDICT_COLUMNS
+from analysis.statistics.claims import CLAIM_COLUMNS, NO_TEST, VERDICT_COLUMNS
 from analysis.statistics.described_verdicts import (
     PLANTED_COLUMNS,
     SETUP_COLUMNS,
@@ -25,7 +26,7 @@ from analysis.statistics.described_verdicts import (
     planted_verdicts,
 )
 from analysis.statistics.equivalence import INCONCLUSIVE
-from analysis.statistics.verdicts import ClaimFound
+from analysis.statistics.verdicts import ClaimFound, overall_row
 from modeling.files.columns import Columns, chosen, names, without
 
 TESTS_SHOWN = chosen(
@@ -36,6 +37,11 @@ TESTS_SHOWN = chosen(
 )
 # Of the table of verdicts.
 _OF_MODEL = ("rule", "tests_verdict", "model_mean", "model_low", "model_high", "p_of_model")
+READ_AND_CHECKED = (
+    "On reading: every value lies in its range; answers follow the planned order of trials, where "
+    "a session's manifest is there; all are of one study and its models. What was found is listed "
+    "under exclusions and deviations."
+)
 BY_MODEL = (
     "Rule “model”: the verdict is that of the model of the participants, over all textures on the "
     "mean effect and on the share of people outside the bounds, of single textures on the mean "
@@ -51,11 +57,13 @@ def sections(answered: Answered) -> list[Section]:
     by_model = any(one.people is not None for one in found)
     verdicts = pd.concat([one.tests["verdict"] for one in found]) if found else pd.Series()
     section = _verdicts(answered) if answered.tested else Section("verdicts", "Verdicts", ())
+    headline = answer(found, responses)
+    lead = f"{FEEL_IT} {LEAD}" if by_model else LEAD
     return [
         replace(
             section,
-            answer=answer(found, responses),
-            lead=f"{FEEL_IT} {LEAD}" if by_model else LEAD,
+            headline=headline and replace(headline, lead=lead),
+            verified=(READ_AND_CHECKED,),
             cautions=tuple(
                 _cautions(responses, inconclusive=bool((verdicts == INCONCLUSIVE).any()))
             ),
@@ -106,17 +114,25 @@ def _verdicts(answered: Answered) -> Section:
         "verdicts",
         "Verdicts",
         (
-            *_forest(judged, simulated=simulated),
             *people_items(judged, simulated=simulated),
             verdicts,
             *_setups_table(judged, simulated=simulated),
             *(_planted_table(judged, planted),) * bool(planted and judged),
             Fold("Tests behind the verdicts", (detail,)),
         ),
+        answer=_verdicts_in_words(judged),
         outcomes=tuple(claim_outcomes(found)),
+        front=_forest(judged, simulated=simulated),
         done=tuple(sentence for sentence, _ in so_far),
         tiles=tuple(tile for _, tile in so_far),
     )
+
+
+def _verdicts_in_words(judged: Sequence[ClaimFound]) -> str:
+    """Each claim and its verdict, without numbers; empty where none has one."""
+    rows = ((one.claim.name, overall_row(one)) for one in judged)
+    said = [f"{name}: {row['verdict'] or NO_TEST}" for name, row in rows if row is not None]
+    return sentence_case(f"{'; '.join(said)}.") if said else ""
 
 
 def _verdicts_shown(*, by_model: bool) -> Columns:

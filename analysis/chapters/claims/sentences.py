@@ -7,18 +7,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from analysis.chapters.claims.people_sentences import (
-    Row,
     chains_disagree,
     disagreement,
     doubled_priors,
-    model_clause,
     texture_effect,
 )
 from analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES, sentence_case, signed, unit_of
 from analysis.page.outcomes import Outcome, Weight
 from analysis.statistics.caveats import DIFFERENCES, INTERIM, WITHOUT_EQUALITY
 from analysis.statistics.claims import CONTROL, NO_TEST, all_equivalent
-from analysis.statistics.verdicts import ClaimFound
+from analysis.statistics.verdicts import ClaimFound, Row, overall_row
 from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.columns import p_value
 
@@ -60,12 +58,6 @@ def _beside(found: ClaimFound, row: Row) -> list[Outcome]:
         (Weight.SECONDARY, doubled_priors(found, row)),
     ]
     return [Outcome(weight, sentence) for weight, sentence in said if sentence]
-
-
-def overall_row(found: ClaimFound) -> Row | None:
-    """The row over all textures; None where all models are identical."""
-    rows = found.tests[found.tests["texture"] == ALL_TEXTURES].to_dict("records")
-    return rows[0] if rows else None
 
 
 def by_verdict(found: ClaimFound) -> dict[str, list[Row]]:
@@ -111,7 +103,7 @@ def _overall(found: ClaimFound, row: Row) -> str:
         tests = f"{difference(found, row, confidence='90%')}{_tests(row)}"
         if found.people is not None:
             shown = row["tests_verdict"] or NO_TEST
-            tests = f"{model_clause(found, row)}; paired tests: {shown}, {tests}"
+            tests = f"paired tests: {shown}, {tests}"
         text += f"; {tests}"
     return f"{sentence_case(text)} (participants: {row['n']})."
 

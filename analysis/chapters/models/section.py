@@ -11,7 +11,7 @@ from analysis.chapters.chapter import LEAD, NOBODY_ASKED, Modelled
 from analysis.labels import IDENTICAL, MODELS, names_or_none, signed
 from analysis.page.outcomes import Outcome, Weight, described
 from analysis.page.page import Fold, Item, Picture, Table
-from analysis.page.sections import Section
+from analysis.page.sections import Headline, Section
 from analysis.spectra.comparison import compare_spectra
 from analysis.spectra.figures.layers_over_speed import figure_layers_over_speed
 from analysis.spectra.figures.spectra import figure_spectra_and_threshold
@@ -46,7 +46,8 @@ VERDICTS_SHOWN = chosen(
 def sections(modelled: Modelled) -> list[Section]:
     """The section on all textures; its answer is that of a report without answers of people."""
     section = model_section(modelled.textures, modelled.gfc)
-    return [replace(section, answer=NOBODY_ASKED, lead=LEAD, cautions=(GFC_CAUTION,))]
+    headline = Headline(NOBODY_ASKED, lead=LEAD)
+    return [replace(section, headline=headline, cautions=(GFC_CAUTION,))]
 
 
 def model_section(textures: Sequence[TextureResult], gfc: pd.DataFrame) -> Section:
@@ -77,7 +78,7 @@ def model_section(textures: Sequence[TextureResult], gfc: pd.DataFrame) -> Secti
     return Section(
         "models",
         "Models and their simplification",
-        (table, *_fit_items(textures), *predicted, *folds),
+        (_example(textures), table, *_fit_items(textures), *predicted, *folds),
         outcomes=(
             *simplification_outcomes(gfc),
             *described(left_out_outcomes(left_out)),
@@ -85,6 +86,12 @@ def model_section(textures: Sequence[TextureResult], gfc: pd.DataFrame) -> Secti
         done=_models_done(textures),
         tiles=_model_tiles(gfc),
     )
+
+
+def _example(textures: Sequence[TextureResult]) -> Picture:
+    """The spectra of the first texture that lost a layer, else of the first."""
+    lost = (r for r in textures if not r.simplification.identical)
+    return _threshold_picture(next(lost, textures[0]), "example")
 
 
 def _fit_items(textures: Sequence[TextureResult]) -> tuple[Item, ...]:
@@ -274,14 +281,17 @@ def simplification_outcomes(gfc: pd.DataFrame) -> list[Outcome]:
 
 def left_out_outcomes(summary: pd.DataFrame) -> list[str]:
     """How well conditions are predicted, from `between.left_out_summary`; none without any."""
-    sentences = []
+    found = []
     for name, rows in summary.groupby("foretold_by", sort=False) if len(summary) else ():
         worst = rows.iloc[int(rows["worst_level_error_db"].abs().to_numpy().argmax())]
-        sentences.append(
-            f"Left-out conditions are predicted by {name} with a level error of "
-            f"{rows['median_level_error_db'].median():.2f} dB (median over textures; at worst "
+        found.append(
+            f"{rows['median_distance_db'].median():.2f} dB by {name} (level error "
+            f"{rows['median_level_error_db'].median():.2f} dB; at worst "
             f"{signed(float(worst['worst_level_error_db']), 1)} dB, {worst['texture']} at "
-            f"{worst['worst_level_error_at']}) and a log-spectral distance of "
-            f"{rows['median_distance_db'].median():.2f} dB."
+            f"{worst['worst_level_error_at']})"
         )
-    return sentences
+    said = (
+        "Left-out conditions are predicted with a log-spectral distance (median over textures) of "
+        f"{'; '.join(found)}."
+    )
+    return [said] * bool(found)

@@ -10,8 +10,10 @@ import pandas as pd
 from analysis.chapters.chapter import Modelled
 from analysis.labels import ALL_LAYERS, signed
 from analysis.page.outcomes import described
-from analysis.page.page import Fold, Item, Table
+from analysis.page.page import Fold, Item, Picture, Table
 from analysis.page.sections import Section
+from analysis.spectra.figures.layers_over_speed import figure_layers_over_speed
+from analysis.spectra.layers_over_grid import layers_over_speed
 from analysis.textures.between import PLANTED_BETWEEN_COLUMNS, planted_between_table
 from analysis.textures.recovery import (
     PLANTED_LAYER_COLUMNS,
@@ -49,8 +51,24 @@ def planted_section(textures: Sequence[TextureResult]) -> Section:
     return Section(
         "planted",
         "Planted truth",
-        (tables[0], *between, *tables[1:]),
+        (_course(textures), tables[0], *between, *tables[1:]),
         outcomes=tuple(described(planted_outcomes(score))),
+    )
+
+
+def _course(textures: Sequence[TextureResult]) -> Picture:
+    """The estimated and the planted layers of the texture that has most of them."""
+    result = max(textures, key=lambda each: each.truth.n_layers if each.truth else 0)
+    assert result.truth is not None
+    force_n = reference_condition(result)[1]
+    truth = result.truth.at_rate(result.model.rate_hz)
+    models = [result.model] + [truth] * (force_n in result.truth.forces_n)
+    return Picture(
+        "planted_course",
+        f"{result.texture}: estimated layers over speed at {force_n:g} N, and the planted ones",
+        "Frequency and amplitude of each layer. Dashed: the planted layers.",
+        figure_layers_over_speed([layers_over_speed(each, force_n=force_n) for each in models]),
+        simulated=True,
     )
 
 

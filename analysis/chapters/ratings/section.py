@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
+
 from analysis.chapters.chapter import Answered, Stream, named_by, who_took_part
 from analysis.chapters.ratings.figure import figure_ratings
-from analysis.labels import TASK_TITLES, sentence_case
+from analysis.labels import MEASURES, TASK_TITLES, sentence_case
 from analysis.page.page import Picture
 from analysis.page.sections import Section, of_task
+from analysis.statistics.verdicts import ClaimFound, overall_row
 from modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
 
 
@@ -19,6 +24,21 @@ def sections(answered: Answered) -> list[Section]:
     """A section for each task with ratings and a verdict on them."""
     found = [_section(answered, stream) for stream in answered.streams("ratings", applies)]
     return [section for section in found if section.items]
+
+
+def _means_in_words(found: Sequence[ClaimFound]) -> str:
+    """Mean ratings with either model over the textures that differ, claim by claim."""
+    said = []
+    for one in found:
+        row = overall_row(one)
+        if row is not None and np.isfinite(row["mean_other"]):
+            reference, other = one.claim.models
+            said.append(
+                f"{MEASURES[one.claim.measure]} {row['mean_reference']:.0f} ({reference}) and "
+                f"{row['mean_other']:.0f} ({other})"
+            )
+    textures = "Means over participants and the textures whose models differ, of 100 points"
+    return f"{textures}: {'; '.join(said)}." if said else ""
 
 
 def _section(answered: Answered, stream: Stream) -> Section:
@@ -42,6 +62,7 @@ def _section(answered: Answered, stream: Stream) -> Section:
         "ratings",
         f"{sentence_case(TASK_TITLES[task])}: ratings",
         tuple(pictures),
+        answer=_means_in_words(found),
         done=(done,),
         tiles=(tile,),
     )

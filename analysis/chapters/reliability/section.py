@@ -93,6 +93,7 @@ def reliability_section(
         "Reliability of the answers",
         tuple(items),
         outcomes=tuple(_outcomes(agreed, raters, careless)),
+        reliability=tuple(_in_short(agreed, careless)),
     )
 
 
@@ -189,6 +190,22 @@ def _outcomes(agreed: pd.DataFrame, raters: pd.DataFrame, careless: pd.DataFrame
             f"({', '.join(people)}); they are not left out."
         )
     return [Outcome(Weight.DESCRIPTIVE, sentence) for sentence in sentences if sentence]
+
+
+def _in_short(agreed: pd.DataFrame, careless: pd.DataFrame) -> list[str]:
+    """Agreement on each scale and careless answers, for the first page."""
+    found = []
+    for scale, own in _by_scale(agreed):
+        rows = own.set_index("kind")["icc"]
+        if np.isfinite(rows["consistency, mean of all"]):
+            found.append(f"{scale} {rows['consistency, mean of all']:.2f}".replace("-", "−"))
+    people = careless["participant_id"].nunique()
+    said = [
+        f"Consistency of the participants' mean ratings (intraclass correlation): "
+        f"{', '.join(found)}; low where all surfaces are rated alike."
+    ] * bool(found)
+    whose = counted(people, "participant") if people else "no participant"
+    return [*said, f"Answers of {whose} look careless."]
 
 
 def _by_scale(table: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:

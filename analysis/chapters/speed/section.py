@@ -180,20 +180,8 @@ def _compared(
         TIME_RATIO_COLUMNS,
         simulated,
     )
-    sentences = [trade_off_sentence(comparison, models=models), *_ratio_sentences(ratios, models)]
-    outcomes = [Outcome(Weight.SECONDARY, f"{whose}{sentence}") for sentence in sentences]
-    return [paired, mixed], outcomes
-
-
-def _ratio_sentences(ratios: pd.DataFrame, models: tuple[str, str]) -> list[str]:
-    found = ratios.to_dict("records")[0]
-    if not np.isfinite(found["ci_low"]):
-        return []
-    how = "; ".join(filter(None, [f"{found['method']} of log time", found["note"]]))
-    return [
-        f"Answers with {models[1]} models took {found['ratio']:.2f} times as long as with "
-        f"{models[0]} models (95% CI {found['ci_low']:.2f} to {found['ci_high']:.2f}; {how})."
-    ]
+    sentence = f"{whose}{trade_off_sentence(comparison, models=models)}"
+    return [paired, mixed], [Outcome(Weight.SECONDARY, sentence)]
 
 
 def _details(

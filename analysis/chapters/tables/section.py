@@ -28,7 +28,7 @@ from analysis.chapters.tables.figure import figure_factorial
 from analysis.figures.confusions import plot_confusion
 from analysis.page.outcomes import Outcome, Weight
 from analysis.page.page import Fold, Picture, Table
-from analysis.page.sections import Section
+from analysis.page.sections import Headline, Section
 from analysis.statistics.confusion import CONFUSION_COLUMNS, ConfusionMatrix, confusion_table
 from modeling.errors import counted
 from modeling.files.columns import p_value
@@ -48,7 +48,9 @@ def table_sections(imported: ImportedAnswers, *, rng: np.random.Generator) -> li
     """
     factors = list(imported.factors)
     cells = participant_cells(imported.answers, imported.measure, factors=factors)
-    first = replace(_condition_section(imported, cells), answer=answer_of_table(imported))
+    first = replace(
+        _condition_section(imported, cells), headline=Headline(answer_of_table(imported))
+    )
     sections = [first]
     if factors and cells["participant_id"].nunique() > 1:
         complete = complete_cells(cells, factors)
