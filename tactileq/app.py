@@ -12,6 +12,7 @@ import typer
 
 from tactileq.interruption import Interrupted, ended_by_signals
 from tactileq.printing import print_warning, sentence_of
+from tactileq.workers import collect_less_often
 
 # The name of every command, and its file in tactileq/commands, which holds a function or a group of
 # commands of that file's name; in the order of tactileq --help.
@@ -82,6 +83,7 @@ def main() -> None:
     A signal that asks it to end: one sentence, and 128 + its number.
     """
     warnings.showwarning = print_warning
+    collect_less_often()
     try:
         with ended_by_signals():
             app(standalone_mode=True)

@@ -11,6 +11,7 @@ from tactileq.printing import progress
 if TYPE_CHECKING:
     from analysis.page.sections import Mapped, Section
     from analysis.textures.results import TextureResult
+    from benches.atlas.case import Case
     from benches.atlas.edges import Examined
     from benches.chart.judging import Judged
     from modeling import ARModel
@@ -29,19 +30,19 @@ class Benches(NamedTuple):
     @classmethod
     def begun(cls, mapped: Mapped, made: Sequence[TextureResult]) -> Benches:
         """All of them, from now on."""
-        from benches.atlas.cases import CASES
         from benches.atlas.edges import columns_of, examine_column
         from benches.chart.judging import judge
         from benches.chart.methods import BRIEF
         from benches.chart.surfaces import FEW_SURFACES, simulated_sources
-        from benches.scenes.examples import compile_examples, drawn_example
+        from benches.scenes.examples import DEMO_EXAMPLES, compile_examples, drawn_example
 
         models = {result.texture: result.model for result in made}
+        cases = own_cases()
         return cls(
             # One call, as what has one item alone is done by this process.
-            mapped(_done, [partial(compile_examples, models), drawn_example]),
+            mapped(_done, [partial(compile_examples, models, DEMO_EXAMPLES), drawn_example]),
             mapped(partial(judge, methods=BRIEF), simulated_sources(FEW_SURFACES)),
-            mapped(partial(examine_column, CASES, full=False), columns_of(CASES, full=False)),
+            mapped(partial(examine_column, cases, full=False), columns_of(cases, full=False)),
         )
 
     def sections(self, rivals: Iterable[ARModel]) -> list[Section]:
@@ -49,8 +50,6 @@ class Benches(NamedTuple):
 
         `rivals` are the AR models of the planted textures' recordings.
         """
-        from benches.atlas.cases import CASES
-        from benches.atlas.edges import columns_of
         from benches.atlas.section import stability_section
         from benches.chart.chart import chart_of
         from benches.chart.page import chart_section
@@ -67,11 +66,18 @@ class Benches(NamedTuple):
         scenes = scene_section([*((one, surfaces) for one in compiled), drawn])
         with progress("Speed against accuracy", FEW_SURFACES.drawn) as advance:
             judged = list(reported(self.judged, advance, lambda one: one.source.name))
-        with progress("Where methods fail", len(columns_of(CASES, full=False))) as advance:
+        with progress("Where methods fail", len(own_cases())) as advance:
             examined = list(reported(self.examined, advance, lambda one: one.case.family))
         # Rendering is timed now that no other process works.
         chart = chart_section(chart_of(judged, turns=CHART_TURNS))
         return [scenes, chart, stability_section(examined)]
+
+
+def own_cases() -> Sequence[Case]:
+    """Of the atlas what the program does by default; tactileq stability examines everything."""
+    from benches.atlas.cases import CASES
+
+    return [case for case in CASES if case.ours and case.axis.default is not None]
 
 
 def _done(task: Any) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import threading
@@ -114,7 +115,13 @@ def _end_with(parent: int) -> None:
     The parent handles keyboard interrupts, which all processes of a terminal receive.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    collect_less_often()
     threading.Thread(target=_watch, args=(parent,), daemon=True).start()
+
+
+def collect_less_often() -> None:
+    """Look for garbage less often: the libraries, once loaded, are a million objects to look at."""
+    gc.set_threshold(100_000, 20, 20)
 
 
 def _watch(parent: int) -> None:

@@ -103,6 +103,7 @@ footer { max-width: 1240px; margin: 0 auto 40px; padding: 0 28px; color: var(--s
   body.report .front { grid-template-columns: 1fr 1fr 1fr; gap: 0 16px; font-size: 8.5pt; }
   body.report .tiles { grid-template-columns: repeat(5, 1fr); gap: 6px; }
   body.report .tile { padding: 4px 7px; } body.report .tile b { font-size: 12pt; }
+  body.report .tile span { display: block; }
   body.report .tile span, body.report .lead { font-size: 8pt; line-height: 1.25; }
   table { width: 100%; font-size: 8pt; }
   .wide table { font-size: 7pt; }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
@@ -35,7 +35,7 @@ from analysis.page.page import (
 from analysis.page.provenance import provenance_table
 from analysis.page.saving import missing_fonts, png_of, svg_of
 from analysis.page.sections import Headline, Mapped, Progress, Section
-from analysis.statistics.verdicts import claims_found
+from analysis.statistics.verdicts import ClaimsBegun
 from analysis.textures.compared import Comparison, comparisons
 from analysis.textures.regressions import driving_table
 from analysis.textures.results import TextureResult
@@ -63,8 +63,9 @@ MODEL_CHAPTERS = (
     "planted",
 )
 SUPPLEMENT_NAME = "supplement.html"
-MODELS_SHARE = 0.4  # of the time that a report of a whole study takes
-PICTURES_SHARE = 0.4
+# Of the time that a report of a whole study takes.
+ANSWERS_SHARE, PICTURES_SHARE = 0.5, 0.25
+ENOUGH_PICTURES = 3  # to have other processes begin with them
 
 
 def write_report(
@@ -126,41 +127,42 @@ def write_report(
     rng = np.random.default_rng(seed)
     if responses is not None:
         responses = _with_identical(responses, textures)
-    # Begun first: other processes compare models while this one analyses answers.
-    compared = comparisons(textures, rng=rng, mapped=mapped) if textures else ()
-    report_progress(0.0, "analysing answers")
+    # Begun first: other processes sample, compare models and draw while this one goes on.
+    streams = rng.spawn(len(textures))
+    claims = None if responses is None else ClaimsBegun.of(responses, rng=rng, mapped=mapped)
+    compared = comparisons(textures, streams, mapped=mapped)
+    drawing = _Drawing(mapped)
+    drawing.begin(benches)
     sections: list[Section] = []
-    if responses is not None:
+    if responses is not None and claims is not None:
+        report_progress(0.0, "testing the claims")
         answered = Answered(
             responses=responses,
-            found=claims_found(responses, rng=rng, mapped=mapped),
+            found=claims.found(),
             rng=rng,
             seed=seed,
             hand=hand,
             planted=planted,
         )
-        for name in ANSWER_CHAPTERS:
-            chapter = cast(AnswerChapter, _sections_of(name))
-            sections += chapter(answered)
+        for number, name in enumerate(ANSWER_CHAPTERS):
+            share = ANSWERS_SHARE * (0.5 + 0.5 * number / len(ANSWER_CHAPTERS))
+            report_progress(share, f"chapter on {name.replace('_', ' ')}")
+            sections += drawing.begin(cast(AnswerChapter, _sections_of(name))(answered))
     if textures:
         modelled = _modelled(textures, compared, progress=report_progress)
         for name in MODEL_CHAPTERS:
-            sections += cast(ModelChapter, _sections_of(name))(modelled)
+            report_progress(1 - PICTURES_SHARE, f"chapter on {name}")
+            sections += drawing.begin(cast(ModelChapter, _sections_of(name))(modelled))
     sections += benches
     if not any(section.items for section in sections):
         raise InputError(
             "expected answers or models to report on, got neither; run a session or fit a model."
         )
-    pictures = _pictures(
-        [item for section in sections for item in (*section.front, *section.items)]
-    )
-    drawn = mapped(_drawn, pictures)
-    facts = {**(provenance or {}), "seed of this report": seed}
     files = _Files(target.parent)
-    for number, (picture, (formats, lacking)) in enumerate(zip(pictures, drawn, strict=True)):
-        share = 1 - PICTURES_SHARE * (1 - number / len(pictures))
-        report_progress(share, f"drawing {picture.title}")
+    for share, picture, (formats, lacking) in drawing.drawn():
+        report_progress(1 - PICTURES_SHARE * (1 - share), f"drawing {picture.title}")
         files.add_picture(picture, formats, lacking=lacking)
+    facts = {**(provenance or {}), "seed of this report": seed}
     undrawn = missing_fonts("".join(sorted(files.lacking)))
     headline = next((s.headline for s in sections if s.headline), Headline(""))
     banner = _banner(responses, textures)
@@ -262,9 +264,8 @@ def _modelled(
 ) -> Modelled:
     """The models, compared one by one, which takes its time."""
     gfc, driven = [], []
-    before = 1 - PICTURES_SHARE - MODELS_SHARE
     for number, (result, comparison) in enumerate(zip(textures, compared, strict=True)):
-        share = before + MODELS_SHARE * number / len(textures)
+        share = ANSWERS_SHARE + (1 - PICTURES_SHARE - ANSWERS_SHARE) * number / len(textures)
         progress(share, f"comparing models of {result.texture}")
         gfc.append(comparison.gfc)
         driven.append(comparison.driven)
@@ -338,6 +339,35 @@ def _drawn(picture: Picture) -> tuple[dict[str, bytes], str]:
     """The picture by the endings of its files, and the characters that no font here has."""
     png, lacking = png_of(picture.figure, dpi=PICTURE_DPI)
     return {"png": png, "svg": svg_of(picture.figure)[0]}, lacking
+
+
+class _Drawing:
+    """Pictures that other processes draw while this one goes on."""
+
+    def __init__(self, mapped: Mapped) -> None:
+        self._mapped = mapped
+        self._waiting: list[Picture] = []
+        self._begun: list[tuple[list[Picture], Iterable[tuple[dict[str, bytes], str]]]] = []
+
+    def begin(self, sections: Sequence[Section]) -> Sequence[Section]:
+        """Draw their pictures, as soon as there are enough; the same sections."""
+        self._waiting += _pictures([item for s in sections for item in (*s.front, *s.items)])
+        if len(self._waiting) >= ENOUGH_PICTURES:
+            self._draw()
+        return sections
+
+    def drawn(self) -> Iterator[tuple[float, Picture, tuple[dict[str, bytes], str]]]:
+        """The share of all that is done, each picture, and what `_drawn` says of it."""
+        self._draw()
+        number, count = 0, sum(len(pictures) for pictures, _ in self._begun)
+        for pictures, drawn in self._begun:
+            for picture, found in zip(pictures, drawn, strict=True):
+                number += 1
+                yield number / count, picture, found
+
+    def _draw(self) -> None:
+        pictures, self._waiting = self._waiting, []
+        self._begun.append((pictures, self._mapped(_drawn, pictures)))
 
 
 class _Files:

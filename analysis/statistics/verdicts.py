@@ -5,7 +5,7 @@ docs/method/statistics.md#verdicts
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -78,48 +78,73 @@ def overall_row(found: ClaimFound) -> Row | None:
     return rows[0] if rows else None
 
 
-def claims_found(
-    responses: Responses, *, rng: np.random.Generator, mapped: Mapped = map
-) -> list[ClaimFound]:
+def claims_found(responses: Responses, *, rng: np.random.Generator) -> list[ClaimFound]:
     """Every claim of the plan, then an exploratory one of each measure that no claim is about.
 
     Parameters
     ----------
     rng : Generator
         Draws sign flips, and seeds the draws from the posterior.
-    mapped : callable
-        How the samplers of several claims are run: `map`, or one that uses several processes. It
-        changes no result.
 
     Returns
     -------
     list of ClaimFound
         Without those about tasks that nobody has begun.
     """
-    found = []
-    own = generators(rng)
-    claims = all_claims(responses)
-    samplers = [_sampler_of(responses, claim, rng=rng) for claim in claims]
-    sampled = iter(mapped(_called, [sampler for sampler in samplers if sampler is not None]))
-    for claim, sampler in zip(claims, samplers, strict=True):
+    return ClaimsBegun.of(responses, rng=rng).found()
+
+
+@dataclass(frozen=True, eq=False)
+class ClaimsBegun:
+    """Claims whose samplers other processes may run, while this one does something else.
+
+    Parameters
+    ----------
+    sampled : iterator of PeopleFound
+        Of the claims that the model decides, in order.
+    """
+
+    responses: Responses
+    claims: Sequence[Claim]
+    by_model: Sequence[bool]
+    sampled: Iterator[PeopleFound]
+    own: Mapping[str, np.random.Generator]
+
+    @classmethod
+    def of(
+        cls, responses: Responses, *, rng: np.random.Generator, mapped: Mapped = map
+    ) -> ClaimsBegun:
+        """Of `claims_found`; `mapped` runs the samplers, and changes no result."""
+        own = generators(rng)
+        claims = all_claims(responses)
+        samplers = [_sampler_of(responses, claim, rng=rng) for claim in claims]
+        sampled = mapped(_called, [sampler for sampler in samplers if sampler is not None])
+        by_model = [sampler is not None for sampler in samplers]
+        return cls(responses, claims, by_model, iter(sampled), own)
+
+    def found(self) -> list[ClaimFound]:
+        """The claims with their tests and, where the model decides, what it says of people."""
+        return [
+            self._found(claim, by_model)
+            for claim, by_model in zip(self.claims, self.by_model, strict=True)
+        ]
+
+    def _found(self, claim: Claim, by_model: bool) -> ClaimFound:
+        responses, rng, few = self.responses, self.own[claim.task], self.responses.plan.few
         values = claim_values(responses, claim)
-        caveats = claim_caveats(responses, claim, rng=own[claim.task])
-        tests = claim_tests(claim, values, caveats=caveats, rng=own[claim.task])
-        few = responses.plan.few
-        people = None if sampler is None else next(sampled)
+        caveats = claim_caveats(responses, claim, rng=rng)
+        tests = claim_tests(claim, values, caveats=caveats, rng=rng)
+        people = next(self.sampled) if by_model else None
         if people is not None:
             tests = with_people(tests, people, claim, caveats=caveats, few=few)
-        found.append(
-            ClaimFound(
-                claim=claim,
-                tests=tests,
-                values=values.table,
-                caveats=caveats,
-                people=people,
-                few=few,
-            )
+        return ClaimFound(
+            claim=claim,
+            tests=tests,
+            values=values.table,
+            caveats=caveats,
+            people=people,
+            few=few,
         )
-    return found
 
 
 def _sampler_of(

@@ -23,19 +23,22 @@ class Comparison:
 
 
 def comparisons(
-    results: Sequence[TextureResult], *, rng: np.random.Generator, mapped: Mapped = map
+    results: Sequence[TextureResult],
+    streams: Sequence[np.random.Generator],
+    *,
+    mapped: Mapped = map,
 ) -> Iterable[Comparison]:
     """The comparison of each texture, in order.
 
     Parameters
     ----------
-    rng : Generator
-        Of the draws behind the expected GFCs: each texture has a stream of its own, so that its
+    streams : sequence of Generator
+        Of the draws behind the expected GFCs: each texture has one of its own, so that its
         numbers do not depend on how the work is divided.
     mapped : callable
         How the textures are gone through.
     """
-    return mapped(_comparison, list(zip(results, rng.spawn(len(results)), strict=True)))
+    return mapped(_comparison, list(zip(results, streams, strict=True)))
 
 
 def _comparison(texture: tuple[TextureResult, np.random.Generator]) -> Comparison:

@@ -39,7 +39,6 @@ from benches.atlas.tables import (
 )
 from modeling.errors import counted
 from modeling.files.columns import chosen, names, without
-from modeling.files.writing import file_stem
 
 BANNER = "SIMULATED: every run uses simulated signals, hand movements, recordings and answers."
 ATLAS_NOTE = (
@@ -95,7 +94,6 @@ def stability_section(examined: Sequence[Examined]) -> Section:
             *_nearest(margins),
             near,
             Fold("All edges, measured and expected by theory", (every,)),
-            Fold("Where methods hold, degrade and fail, family by family", _families(examined)),
         ),
         outcomes=tuple(_outcomes(margins, edges)),
         done=tuple(f"Not in the atlas yet: {name}, {why}." for name, why in TO_COME.items()),
@@ -114,23 +112,6 @@ def _nearest(margins: pd.DataFrame) -> tuple[Picture, ...]:
         simulated=True,
     )
     return (picture,)
-
-
-def _families(examined: Sequence[Examined]) -> tuple[Picture, ...]:
-    """A picture of each family of methods, which paper can show."""
-    families: dict[str, list[Examined]] = {}
-    for one in examined:
-        families.setdefault(one.case.family, []).append(one)
-    return tuple(
-        Picture(
-            file_stem(f"stability_{family}"),
-            f"Where methods hold, degrade and fail: {family}",
-            ATLAS_NOTE,
-            figure_atlas(own, columns=2),
-            simulated=True,
-        )
-        for family, own in families.items()
-    )
 
 
 def _how_close(row: Mapping[Hashable, Any]) -> str:
@@ -206,13 +187,8 @@ def _page(
         simulated=False,
     )
     outcomes = [outcome.sentence for outcome in section.outcomes]
-    tables = [item for item in section.items if isinstance(item, Table)]
-    folds = [
-        item
-        for item in section.items
-        if isinstance(item, Fold) and not any(isinstance(each, Picture) for each in item.items)
-    ]
-    shown: list[Item] = [atlas, *tables, *folds, Fold("Every run", (runs,))]
+    tables = (item for item in section.items if not isinstance(item, Picture))
+    shown: list[Item] = [atlas, *tables, Fold("Every run", (runs,))]
     return page(
         title="Where do methods fail?",
         answer=outcomes[0] if outcomes else "No default was examined.",

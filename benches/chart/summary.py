@@ -255,23 +255,29 @@ def comparisons(rows: pd.DataFrame) -> list[RivalComparison]:
     by_surface = rows[rows["precision"] == DOUBLE].groupby([*VARIANT, "surface"], sort=False)
     cases = by_surface.mean(numeric_only=True).reset_index()
     for kind, of_kind in cases.groupby("kind", sort=False):
-        default = default_rows(of_kind)
-        mine = default[default["method"] == OUR_METHOD].set_index("surface")
+        defaults = default_rows(of_kind).set_index("surface")
+        mine = defaults[defaults["method"] == OUR_METHOD]
+        variants = _variants(of_kind)
         for rival in RIVALS:
-            other = default[default["method"] == rival].set_index("surface")
+            other = defaults[defaults["method"] == rival]
             if len(mine.index.intersection(other.index)):
-                found.append(_comparison(of_kind, mine, other, kind=str(kind), rival=rival))
+                found.append(_comparison(variants, mine, other, kind=str(kind), rival=rival))
     return found
 
 
 def _comparison(
-    of_kind: pd.DataFrame, mine: pd.DataFrame, other: pd.DataFrame, *, kind: str, rival: str
+    variants: Sequence[pd.DataFrame],
+    mine: pd.DataFrame,
+    other: pd.DataFrame,
+    *,
+    kind: str,
+    rival: str,
 ) -> RivalComparison:
-    """Of one rival."""
+    """Of one rival; all tables are indexed by surface."""
     pair = _paired(other, mine)
-    theirs = of_kind[of_kind["method"] == rival]
-    dominated = _dominated(theirs, by=of_kind[of_kind["family"].isin(OUR_FAMILIES)])
-    dominates = _dominated(of_kind[of_kind["method"] == OUR_METHOD], by=theirs)
+    theirs = [rows for rows in variants if rows["method"].iloc[0] == rival]
+    ours = [rows for rows in variants if rows["family"].iloc[0] in OUR_FAMILIES]
+    own = [rows for rows in variants if rows["method"].iloc[0] == OUR_METHOD]
     between = f"{BETWEEN}_distance_db"
     return RivalComparison(
         kind=kind,
@@ -279,37 +285,40 @@ def _comparison(
         ratios={name: _ratio(column, *pair) for name, column in _COMPARED.items()},
         worst_db=(float(pair[0][between].max()), float(pair[1][between].max())),
         surfaces=len(pair[0]),
-        dominated_by=dict(dominated),
-        dominates_by=dict(dominates),
+        dominated_by=dict(_dominated(theirs, other, by=ours)),
+        dominates_by=dict(_dominated(own, mine, by=theirs)),
     )
 
 
-def _dominated(method: pd.DataFrame, *, by: pd.DataFrame) -> Iterator[tuple[str, Dominating]]:
+def _dominated(
+    method: Sequence[pd.DataFrame], default: pd.DataFrame, *, by: Sequence[pd.DataFrame]
+) -> Iterator[tuple[str, Dominating]]:
     """Places where every variant of a method is dominated, with what dominates its default."""
-    default = default_rows(method).set_index("surface")
     for place in _HANDS:
-        every = [
-            _dominating(by, variant.set_index("surface"), place) for variant in _variants(method)
-        ]
-        if all(every):
+        if all(_dominating(by, variant, place) for variant in method):
             found = _dominating(by, default, place)
             assert found is not None, "the default is one of the variants"
             yield place, found
 
 
-def _variants(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
-    for _, variant in rows.groupby(["method", "blending", "update_ms"], sort=False):
-        yield variant
+def _variants(rows: pd.DataFrame) -> list[pd.DataFrame]:
+    """The rows of each variant, indexed by surface."""
+    by_variant = rows.groupby(["method", "blending", "update_ms"], sort=False)
+    return [variant.set_index("surface") for _, variant in by_variant]
 
 
-def _dominating(variants: pd.DataFrame, target: pd.DataFrame, place: str) -> Dominating | None:
-    """The closest to the truth of the variants that dominate a target indexed by surface."""
+def _dominating(
+    variants: Sequence[pd.DataFrame], target: pd.DataFrame, place: str
+) -> Dominating | None:
+    """The closest to the truth of the variants that dominate a target; indexed by surface."""
     found = []
-    for rows in _variants(variants):
-        pair = _paired(rows.set_index("surface"), target)
+    for rows in variants:
+        pair = _paired(rows, target)
         operations = _ratio("operations", *pair)
+        if not operations.high <= 1:  # or unknown
+            continue
         distance = _ratio(f"{place}_distance_db", *pair)
-        if operations.high <= 1 and distance.high <= 1 and distance.mean < 1:
+        if distance.high <= 1 and distance.mean < 1:
             first = rows.iloc[0]
             variant = Variant(first["method"], first["blending"], float(first["update_ms"]))
             found.append(Dominating(variant, operations, distance))
@@ -318,6 +327,8 @@ def _dominating(variants: pd.DataFrame, target: pd.DataFrame, place: str) -> Dom
 
 def _paired(first: pd.DataFrame, second: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
     """The rows of the surfaces that both have."""
+    if first.index.equals(second.index):
+        return first, second
     both = first.index.intersection(second.index)
     return first.loc[both], second.loc[both]
 

@@ -47,7 +47,8 @@ def sections(modelled: Modelled) -> list[Section]:
     """The section on all textures; its answer is that of a report without answers of people."""
     section = model_section(modelled.textures, modelled.gfc)
     headline = Headline(NOBODY_ASKED, lead=LEAD)
-    return [replace(section, headline=headline, cautions=(GFC_CAUTION,))]
+    caution = described([GFC_CAUTION])
+    return [replace(section, headline=headline, outcomes=(*section.outcomes, *caution))]
 
 
 def model_section(textures: Sequence[TextureResult], gfc: pd.DataFrame) -> Section:
@@ -60,7 +61,11 @@ def model_section(textures: Sequence[TextureResult], gfc: pd.DataFrame) -> Secti
     gfc : DataFrame
         `analysis.textures.likeness.gfc_table` of all of them.
     """
-    folds = [_texture_fold(result, number=number) for number, result in enumerate(textures)]
+    example = _example(textures)
+    folds = [
+        _texture_fold(result, number=number, drawn=result is example)
+        for number, result in enumerate(textures)
+    ]
     table = Table(
         "gfc",
         "Simplification rate and quality",
@@ -78,7 +83,7 @@ def model_section(textures: Sequence[TextureResult], gfc: pd.DataFrame) -> Secti
     return Section(
         "models",
         "Models and their simplification",
-        (_example(textures), table, *_fit_items(textures), *predicted, *folds),
+        (_threshold_picture(example, "example"), table, *_fit_items(textures), *predicted, *folds),
         outcomes=(
             *simplification_outcomes(gfc),
             *described(left_out_outcomes(left_out)),
@@ -88,10 +93,10 @@ def model_section(textures: Sequence[TextureResult], gfc: pd.DataFrame) -> Secti
     )
 
 
-def _example(textures: Sequence[TextureResult]) -> Picture:
-    """The spectra of the first texture that lost a layer, else of the first."""
-    lost = (r for r in textures if not r.simplification.identical)
-    return _threshold_picture(next(lost, textures[0]), "example")
+def _example(textures: Sequence[TextureResult]) -> TextureResult:
+    """The first texture that lost a layer, else the first."""
+    lost = (result for result in textures if not result.simplification.identical)
+    return next(lost, textures[0])
 
 
 def _fit_items(textures: Sequence[TextureResult]) -> tuple[Item, ...]:
@@ -184,7 +189,8 @@ def _model_tiles(gfc: pd.DataFrame) -> tuple[tuple[str, str], ...]:
     )
 
 
-def _texture_fold(result: TextureResult, *, number: int) -> Fold:
+def _texture_fold(result: TextureResult, *, number: int, drawn: bool) -> Fold:
+    """Everything on a texture; without the spectra where the chapter begins with them."""
     stem = f"{number + 1}_{file_stem(result.texture)}"
     verdicts = Table(
         f"verdicts_{stem}",
@@ -201,7 +207,11 @@ def _texture_fold(result: TextureResult, *, number: int) -> Fold:
     kept, all_layers = result.simplification.model.n_layers, result.model.n_layers
     return Fold(
         f"{result.texture}: {kept} of {counted(all_layers, 'layer')} kept",
-        (verdicts, _threshold_picture(result, stem), _course_picture(result, stem)),
+        (
+            verdicts,
+            *(() if drawn else (_threshold_picture(result, stem),)),
+            _course_picture(result, stem),
+        ),
         opened=number == 0,
     )
 

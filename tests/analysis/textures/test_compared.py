@@ -15,7 +15,7 @@ def backwards(work, items):
 
 
 def test_both_tables_of_a_texture_rest_on_the_same_draws(results):
-    for compared in comparisons(results, rng=np.random.default_rng(1)):
+    for compared in comparisons(results, np.random.default_rng(1).spawn(len(results))):
         full, grid = compared.gfc.iloc[0], compared.driven.iloc[0]
         assert (full["model"], grid["driven_by"]) == ("full", "grid")
         shared = [name for name in compared.driven if name in compared.gfc]
@@ -24,8 +24,8 @@ def test_both_tables_of_a_texture_rest_on_the_same_draws(results):
 
 
 def test_a_texture_has_draws_of_its_own_however_the_work_is_divided(results):
-    in_turn = list(comparisons(results, rng=np.random.default_rng(1)))
-    divided = list(comparisons(results, rng=np.random.default_rng(1), mapped=backwards))
+    in_turn = list(comparisons(results, np.random.default_rng(1).spawn(len(results))))
+    divided = list(comparisons(results, np.random.default_rng(1).spawn(len(results)), mapped=backwards))
     alone = next(iter(comparisons(results[:1], rng=np.random.default_rng(1))))
     for first, second in zip(in_turn, divided, strict=True):
         pd.testing.assert_frame_equal(first.gfc, second.gfc, check_exact=True)
