@@ -101,7 +101,7 @@ footer { max-width: 1240px; margin: 0 auto 40px; padding: 0 28px; color: var(--s
   body.report ul { margin: 3px 0 0; } body.report li { margin: 2px 0; }
   body.report figure { margin: 6px 0; }
   body.report .front { grid-template-columns: 1fr 1fr 1fr; gap: 0 16px; font-size: 8.5pt; }
-  body.report .tiles { grid-template-columns: repeat(5, 1fr); gap: 6px; }
+  body.report .tiles { grid-template-columns: repeat(auto-fit, minmax(32mm, 1fr)); gap: 6px; }
   body.report .tile { padding: 4px 7px; } body.report .tile b { font-size: 12pt; }
   body.report .tile span { display: block; }
   body.report .tile span, body.report .lead { font-size: 8pt; line-height: 1.25; }

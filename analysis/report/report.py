@@ -168,7 +168,11 @@ def write_report(
     banner = _banner(responses, textures)
     chapters = [_Chapter.of(section, files) for section in sections if section.items]
     chapters.append(_origin(sections, facts, files=files, undrawn=undrawn))
-    overview = ("overview", "At a glance", _overview(sections, files, real=not banner))
+    overview = (
+        "overview",
+        "At a glance",
+        _overview(sections, files, real=_real(responses, textures)),
+    )
     html = page(
         title=title,
         answer=headline.subject,
@@ -284,12 +288,12 @@ def _with_identical(responses: Responses, textures: Sequence[TextureResult]) -> 
     return replace(responses, equal=equal)
 
 
-def _overview(sections: Sequence[Section], files: _Files, *, real: bool) -> str:
+def _overview(sections: Sequence[Section], files: _Files, *, real: Sequence[str]) -> str:
     """The first page below its answer: who, pictures, and what bears on the answer."""
     # An unfinished task is reported in its own section and in the one on the verdicts.
     tiles_once = list(dict.fromkeys(tile for section in sections for tile in section.tiles))
     verified = [sentence for section in sections for sentence in section.verified]
-    verified += ["Nothing is simulated: people, rig and recordings are real."] * real
+    verified += [f"Real: {', '.join(real)}."] * bool(real)
     warned = [sentence for section in sections for sentence in section.cautions]
     caution = f'<div class="caution"><h3>What must not be concluded</h3>{bullets(warned)}</div>'
     below = {
@@ -309,6 +313,15 @@ def _overview(sections: Sequence[Section], files: _Files, *, real: bool) -> str:
         + files.html([picture for section in sections for picture in section.front])
         + f'<div class="front">{columns}{caution * bool(warned)}</div>'
     )
+
+
+def _real(responses: Responses | None, textures: Sequence[TextureResult]) -> list[str]:
+    """What is not simulated."""
+    found = []
+    if responses is not None:
+        found += ["people"] * (not responses.simulated_participants)
+        found += ["rig"] * (not responses.simulated_rig)
+    return found + ["recordings"] * bool(textures and not any(r.simulated for r in textures))
 
 
 def _banner(responses: Responses | None, textures: Sequence[TextureResult]) -> str:

@@ -160,7 +160,7 @@ def chart_section(chart: Chart) -> Section:
         "chart",
         "Speed against accuracy",
         (*chart_pictures(chart), *chart_tables(chart)),
-        outcomes=tuple(described(_in_short(chart, kind) for kind in chart.kinds)),
+        outcomes=tuple(described(filter(None, (_in_short(chart, kind) for kind in chart.kinds)))),
         done=(
             f"{_counted(chart)} were modelled by {chart.rows['method'].nunique()} methods, each "
             "rendered in several ways and compared with the truth.",
@@ -169,8 +169,10 @@ def chart_section(chart: Chart) -> Section:
 
 
 def _in_short(chart: Chart, kind: Kind) -> str:
-    """How many rivals are cheaper than our default, and how many nearer to the truth."""
+    """How many rivals are cheaper than our default, and how many nearer; empty without any."""
     found = [one for one in chart.comparisons if one.kind == kind]
+    if not found:
+        return ""
     cost = {one.rival: one.ratios["operations"].mean for one in found}
     place = "between" if np.isnan(found[0].ratios["stroking"].mean) else "stroking"
     distance = {one.rival: one.ratios[place].mean for one in found}

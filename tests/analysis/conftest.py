@@ -16,6 +16,7 @@ from analysis.answers.plan import AnalysisPlan, Claim
 from analysis.answers.responses import Responses
 from analysis.chapters.chapter import Answered
 from analysis.labels import ALL_TEXTURES, SCALES
+from analysis.page.sections import Headline
 from analysis.statistics.claims import with_people
 from analysis.statistics.participants.verdict import PeopleFound, PeopleSummary
 from analysis.statistics.verdicts import ClaimFound, claims_found
@@ -369,6 +370,11 @@ def few_draws() -> Iterator[None]:
         patch.setattr("analysis.statistics.paired.RESAMPLES", 999)
         patch.setattr("analysis.statistics.rates.BOOTSTRAP_RESAMPLES", 500)
         yield
+
+
+def words_of(headline: Headline | None) -> str:
+    """The answer of a report, with its points."""
+    return " ".join([headline.subject, *headline.points]) if headline else ""
 
 
 def answered_of(

@@ -102,16 +102,6 @@ def about(share: float) -> str:
     return f"about {10 * share:.0f} in 10 people feel it"
 
 
-def model_clause(found: ClaimFound, row: Row) -> str:
-    """Mean and share by the model, for the sentence on all textures."""
-    text = f"model of the participants: {mean_effect(found)}"
-    if row["verdict"] == WITHHELD:
-        return text
-    most = percent(_people(found).summary.share_most)
-    limit = "" if row["doubt"] else f", at most {most} with a probability of 95%"
-    return f"{text}, {share_phrase(found, row)}{limit}"
-
-
 def disagreement(found: ClaimFound, row: Row) -> str:
     """That the paired tests say something else, and why that may be; empty where they do not."""
     verdict, tests = row["verdict"], row["tests_verdict"]

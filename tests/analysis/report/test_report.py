@@ -194,6 +194,50 @@ def test_the_answer_comes_first(folder, shown):
     assert shown.text.index("Forced choice, full model") < shown.text.index("Most frequent")
 
 
+def test_a_chapter_begins_with_its_answer_and_one_picture(folder):
+    html = (folder / "report.html").read_text(encoding="utf-8")
+    chapters = re.findall(r'<section id="([^"]+)">(.*?)</section>', html, re.DOTALL)
+    assert chapters[0][0] == "overview"
+    for anchor, text in chapters[1:]:
+        opening, *supplement = text.split('<details class="supplement">')
+        assert opening.count("<figure") <= 1, anchor
+        assert "<table" not in opening, anchor
+        assert len(supplement) <= 1, anchor
+        if anchor != "origin":
+            assert re.match(r'<h2>[^<]+</h2><p class="answer">', opening), anchor
+    pictured = [anchor for anchor, text in chapters if "<figure" in text]
+    assert {"overview", "ratings", "models", "planted", "parameters"} <= set(pictured)
+
+
+def test_no_finding_is_told_twice(folder):
+    html = (folder / "report.html").read_text(encoding="utf-8")
+    shown = re.sub(
+        r'<details class="supplement">.*?</section>', "</section>", html, flags=re.DOTALL
+    )
+    said = re.findall(r"<li>(.*?)</li>|<p class=\"answer\">(.*?)</p>", shown, re.DOTALL)
+    sentences = [one or other for one, other in said]
+    assert len(sentences) > 20
+    assert len(sentences) == len(set(sentences))
+
+
+def test_the_supplement_is_a_file_of_its_own(folder, shown):
+    behind = Page((folder / "supplement.html").read_text(encoding="utf-8"))
+    for reference in behind.references:
+        assert reference.startswith(("#", "data:image/png;base64,"))
+    tables = {name for name in behind.identifiers if name.startswith("table-")}
+    # On paper the report has no table: all of them are in the supplement.
+    assert tables == {name for name in shown.identifiers if name.startswith("table-")}
+    pictures = {name for name in behind.identifiers if name.startswith("figure-")}
+    whole = {name for name in shown.identifiers if name.startswith("figure-")}
+    opening = {"figure-ratings", "figure-threshold_example", "figure-planted_course"}
+    assert opening <= whole - pictures
+    assert "SIMULATED" in behind.text
+    html = (folder / "report.html").read_text(encoding="utf-8")
+    assert "body.report details.supplement { display: none; }" in html
+    assert '<body class="report">' in html
+    assert '<body class="report">' not in (folder / "supplement.html").read_text("utf-8")
+
+
 def test_an_interrupted_study_says_how_much_was_planned(tmp_path, ratings, choices):
     begun = replace(
         responses_of(ratings, choices, simulated=False),
@@ -272,7 +316,7 @@ def test_links_lead_somewhere(shown):
 
 def test_every_figure_is_inline_and_beside_the_report(folder, shown):
     pictures = {path.stem: path.read_bytes() for path in (folder / "figures").glob("*.png")}
-    assert len(pictures) == 2 * 2 + 1 + 7
+    assert len(pictures) == 2 * 2 + 2 + 7
     inline = {
         base64.b64decode(reference.split(",", 1)[1])
         for reference in shown.references

@@ -209,7 +209,7 @@ def tables(results, ratings, choices, found) -> list[Table]:
     case = hands.CASES[0]
     [surface] = simulated_sources(Simulated(1, ()))
     textures = [replace(results[0], left_out={"joint": predicted}), *results[1:]]
-    compared = list(comparisons(textures, rng=np.random.default_rng(1)))
+    compared = list(comparisons(textures, np.random.default_rng(1).spawn(len(textures))))
     judged = [by_model(found[0], people_summary()), *found[1:]]
     planted = {"PVC": {"magnitude_similarity": -30.0}}
     answered = answered_of(responses, found=judged, planted=planted)

@@ -25,14 +25,16 @@ def test_both_tables_of_a_texture_rest_on_the_same_draws(results):
 
 def test_a_texture_has_draws_of_its_own_however_the_work_is_divided(results):
     in_turn = list(comparisons(results, np.random.default_rng(1).spawn(len(results))))
-    divided = list(comparisons(results, np.random.default_rng(1).spawn(len(results)), mapped=backwards))
-    alone = next(iter(comparisons(results[:1], rng=np.random.default_rng(1))))
+    divided = list(
+        comparisons(results, np.random.default_rng(1).spawn(len(results)), mapped=backwards)
+    )
+    alone = next(iter(comparisons(results[:1], np.random.default_rng(1).spawn(1))))
     for first, second in zip(in_turn, divided, strict=True):
         pd.testing.assert_frame_equal(first.gfc, second.gfc, check_exact=True)
         pd.testing.assert_frame_equal(first.driven, second.driven, check_exact=True)
     pd.testing.assert_frame_equal(in_turn[0].gfc, alone.gfc, check_exact=True)
     expected = {
         one.gfc["gfc30_expected"][0]
-        for one in comparisons([results[0]] * 2, rng=np.random.default_rng(1))
+        for one in comparisons([results[0]] * 2, np.random.default_rng(1).spawn(2))
     }
     assert len(expected) == 2

@@ -226,7 +226,7 @@ def test_figure_five_shows_every_texture_with_units(models, tmp_path) -> None:
 
 
 def driving_of(results):
-    compared = comparisons(results, rng=np.random.default_rng(3))
+    compared = comparisons(results, np.random.default_rng(3).spawn(len(results)))
     return driving_table([comparison.driven for comparison in compared])
 
 

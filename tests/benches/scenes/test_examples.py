@@ -88,9 +88,9 @@ def test_the_truth_tells_a_better_model_from_a_worse_one(judged) -> None:
 
 def test_the_section_says_what_came_out(judged) -> None:
     section = scene_section([judged])
-    [outcome] = section.outcomes
-    assert "3 of 3 seconds" in str(outcome)
-    assert "AR(20)" in str(outcome)
+    kept, rival = (outcome.sentence for outcome in section.outcomes)
+    assert "3 of 3 seconds" in kept
+    assert "AR(20)" in rival
 
 
 def test_scenes_of_drawn_surfaces_are_compiled_from_recordings() -> None:

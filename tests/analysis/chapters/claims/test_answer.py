@@ -13,9 +13,11 @@ from analysis.chapters.claims.answer import answer, unfinished_tasks
 from analysis.chapters.claims.plan_sentences import deviations, methods_paragraph
 from analysis.chapters.claims.sentences import claim_outcomes, difference, overall_row
 from analysis.labels import ALL_TEXTURES
-from analysis.page.outcomes import HEADINGS, Outcome, Weight, by_weight
+from analysis.page.outcomes import Outcome, Weight
+from analysis.page.sections import Section
 from analysis.statistics.claims import CONTROL
 from analysis.statistics.verdicts import ClaimFound, claims_found
+from tests.analysis.conftest import words_of
 
 pytestmark = pytest.mark.usefixtures("few_draws")
 
@@ -41,7 +43,7 @@ def analysed(responses: Responses) -> list[ClaimFound]:
 
 
 def told(responses: Responses) -> str:
-    return answer(analysed(responses), responses)
+    return words_of(answer(analysed(responses), responses))
 
 
 def with_verdict(found: list[ClaimFound], verdict: str) -> list[ClaimFound]:
@@ -55,9 +57,11 @@ def with_verdict(found: list[ClaimFound], verdict: str) -> list[ClaimFound]:
 
 
 def test_the_answer_is_the_verdicts_with_their_intervals(people, own):
-    sentence = answer(own, people)
-    assert sentence.startswith("Simplified compared with full models, over all textures: ")
-    assert sentence.count(".") == sentence.replace(". ", "").count(".")  # one sentence
+    headline = answer(own, people)
+    assert headline is not None
+    assert headline.subject == "Simplified compared with full models, over all textures:"
+    assert all(point.endswith(".") for point in headline.points)
+    sentence = words_of(headline)
     for one in own:
         row = overall_row(one)
         assert row is not None
@@ -66,9 +70,8 @@ def test_the_answer_is_the_verdicts_with_their_intervals(people, own):
     shown = f"(90% CI {low} to {high}, bounds -7.5 to +7.5)".replace("-", "−")
     assert shown in sentence
     assert "bounds −10.0 to +10.0)" in sentence
-    assert (
-        "; single textures that differ: PVC (rated similarity of vibration magnitude)" in sentence
-    )
+    named = "Single textures that differ: PVC (rated similarity of vibration magnitude)"
+    assert headline.points[-1].startswith(named)
 
 
 @pytest.mark.parametrize(
@@ -83,8 +86,8 @@ def test_the_answer_is_the_verdicts_with_their_intervals(people, own):
     ],
 )
 def test_each_verdict_has_its_words(people, found, verdict, words):
-    sentence = answer(with_verdict(found, verdict), people)
-    assert words in sentence
+    sentence = words_of(answer(with_verdict(found, verdict), people))
+    assert words in sentence.lower()
     # Those of one verdict stand together.
     assert " and the correct rate" in sentence
     assert ("CI" in sentence) == (not verdict.startswith("interim"))
@@ -93,7 +96,7 @@ def test_each_verdict_has_its_words(people, found, verdict, words):
 def test_why_equality_is_withheld_is_said(people, found):
     withheld = with_verdict(found, "equivalence withheld")
     alike = replace(withheld[1], tests=withheld[1].tests.assign(doubt="all alike"))
-    assert "since all alike" in answer([alike], people)
+    assert "since all alike" in words_of(answer([alike], people))
     assert "withheld, since all alike" in claim_outcomes([alike])[0].sentence
     assert "BF₀₁" not in claim_outcomes([alike])[0].sentence
     assert "BF₀₁" in claim_outcomes([found[1]])[0].sentence
@@ -111,10 +114,10 @@ def test_without_a_plan_nothing_is_called_equal(people):
 
 
 def test_who_did_not_feel_a_surface_is_said_first(people, own):
-    assert answer(own, replace(people, simulated_participants=True)).startswith(
+    assert words_of(answer(own, replace(people, simulated_participants=True))).startswith(
         "In a simulation without people, simplified compared with full models"
     )
-    assert answer(own, replace(people, simulated_rig=True)).startswith(
+    assert words_of(answer(own, replace(people, simulated_rig=True))).startswith(
         "At a simulated rig, where nobody felt a real surface, simplified"
     )
 
@@ -123,7 +126,7 @@ def test_an_unfinished_study_answers_so_far(people):
     begun = replace(people, planned={"relative": PlannedTask(24, 48, repeats=3)})
     sentence = told(begun)
     assert sentence.startswith("So far, simplified compared with full models")
-    assert "no verdict before the study is complete on the correct rate" in sentence
+    assert "no verdict before the study is complete on the correct rate" in sentence.lower()
     assert unfinished_tasks(begun) == [
         "forced choice: 16 of 24 planned participants, 16 of 48 planned sessions"
     ]
@@ -200,8 +203,7 @@ def test_the_weightiest_findings_come_first():
         Outcome(Weight.OVERALL, "all"),
         Outcome(Weight.TEXTURES, "PVC"),
     ]
-    assert by_weight(outcomes) == {
-        HEADINGS[Weight.OVERALL]: ["all"],
-        HEADINGS[Weight.TEXTURES]: ["canvas", "PVC"],
-        HEADINGS[Weight.DESCRIPTIVE]: ["layers"],
-    }
+    section = Section("verdicts", "Verdicts", (), outcomes=tuple(outcomes))
+    assert section.findings == ("all", "canvas", "PVC", "layers")
+    answered = replace(section, answer="PVC")
+    assert answered.findings == ("PVC", "all", "canvas", "layers")  # none twice

@@ -22,7 +22,7 @@ from analysis.chapters.oddity import section as oddity_chapter
 from analysis.chapters.ratings import section as ratings_chapter
 from analysis.chapters.tasks import section as tasks_chapter
 from analysis.labels import ALL_TEXTURES, TASK_TITLES
-from analysis.page.sections import Section
+from analysis.page.sections import Headline, Section
 from analysis.report.report import write_report
 from analysis.statistics.compared_answers import chance_of
 from analysis.statistics.rates import UNKNOWN_CHANCE
@@ -187,7 +187,7 @@ def test_a_task_without_ratings_or_right_answers_is_counted(tmp_path, declare, a
     asked = replace(
         alone, answers={"pair": pairs.drop(columns="correct")}, plan=AnalysisPlan(claims=())
     )
-    assert answer(found_in(asked), asked) == NOTHING_TO_CLAIM
+    assert answer(found_in(asked), asked) == Headline(NOTHING_TO_CLAIM)
     tables = written(tmp_path, asked)
     assert tables["asked_pair"]["done"].tolist() == ["18", "18", str(18 * 42)]
     assert "claims" not in tables
