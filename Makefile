@@ -29,7 +29,7 @@ install: .venv/installed
 
 .venv/packages: requirements.lock
 	@test -n "$(PYTHON)" || { echo "error: expected Python 3.11 or 3.12, got neither; install python3.11 and python3-venv (or make PYTHON=/path/to/python)." >&2; exit 1; }
-	@echo "Setting up .venv with $(PYTHON) (about 1.5 GB, a minute or two) ..."
+	@echo "Setting up .venv with $(PYTHON) (about 1.8 GB, a minute or two) ..."
 	@$(PYTHON) -m venv .venv || { echo "error: expected the venv module, got none; install python3-venv." >&2; exit 1; }
 	@$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes --no-compile -r requirements.lock
 	@$(COMPILE) $(addprefix .venv/lib/python*/site-packages/,$(LOADED))
