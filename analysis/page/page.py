@@ -93,7 +93,7 @@ footer { max-width: 1240px; margin: 0 auto 40px; padding: 0 28px; color: var(--s
   body.report #overview img { max-height: 66mm; }
   body.report #overview figcaption { font-size: 7.5pt; line-height: 1.25; }
   body.report .caution { margin-top: 8px; }
-  body.report figure img { max-height: 92mm; max-width: 100%; }
+  body.report figure img { max-height: 125mm; max-width: 100%; }
   body.report figure.tall { page: auto; }
   body.report h1 { font-size: 17pt; } body.report h2 { font-size: 13pt; margin-bottom: 4px; }
   body.report h3 { font-size: 10pt; margin: 10px 0 2px; }
