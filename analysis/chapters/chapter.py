@@ -165,6 +165,7 @@ class Modelled:
 
 AnswerChapter = Callable[[Answered], Sequence[Section]]
 ModelChapter = Callable[[Modelled], Sequence[Section]]
+StudyChapter = Callable[[Answered | None, Modelled | None], Sequence[Section]]
 
 
 def who_took_part(responses: Responses, task: str) -> tuple[str, tuple[str, str]]:

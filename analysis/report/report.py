@@ -13,7 +13,13 @@ import numpy as np
 import pandas as pd
 
 from analysis.answers.responses import Responses
-from analysis.chapters.chapter import AnswerChapter, Answered, ModelChapter, Modelled
+from analysis.chapters.chapter import (
+    AnswerChapter,
+    Answered,
+    ModelChapter,
+    Modelled,
+    StudyChapter,
+)
 from analysis.columns import tsv_text
 from analysis.labels import MODELS
 from analysis.page.page import (
@@ -63,6 +69,8 @@ MODEL_CHAPTERS = (
     "planted",
 )
 SUPPLEMENT_NAME = "supplement.html"
+# About answers and models, either of which a report may lack.
+STUDY_CHAPTERS = ("paper",)
 # Of the time that a report of a whole study takes.
 ANSWERS_SHARE, PICTURES_SHARE = 0.5, 0.25
 ENOUGH_PICTURES = 3  # to have other processes begin with them
@@ -134,6 +142,7 @@ def write_report(
     drawing = _Drawing(mapped)
     drawing.begin(benches)
     sections: list[Section] = []
+    answered, modelled = None, None
     if responses is not None and claims is not None:
         report_progress(0.0, "testing the claims")
         answered = Answered(
@@ -153,6 +162,8 @@ def write_report(
         for name in MODEL_CHAPTERS:
             report_progress(1 - PICTURES_SHARE, f"chapter on {name}")
             sections += drawing.begin(cast(ModelChapter, _sections_of(name))(modelled))
+    for name in STUDY_CHAPTERS:
+        sections += drawing.begin(cast(StudyChapter, _sections_of(name))(answered, modelled))
     sections += benches
     if not any(section.items for section in sections):
         raise InputError(

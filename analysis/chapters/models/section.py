@@ -63,9 +63,10 @@ def model_section(textures: Sequence[TextureResult], gfc: pd.DataFrame) -> Secti
     """
     example = _example(textures)
     folds = [
-        _texture_fold(result, number=number, drawn=result is example)
+        _texture_fold(result, number=number, drawn=number == example)
         for number, result in enumerate(textures)
     ]
+    spectra = _threshold_picture(textures[example], _stem(textures[example], example))
     table = Table(
         "gfc",
         "Simplification rate and quality",
@@ -83,7 +84,7 @@ def model_section(textures: Sequence[TextureResult], gfc: pd.DataFrame) -> Secti
     return Section(
         "models",
         "Models and their simplification",
-        (_threshold_picture(example, "example"), table, *_fit_items(textures), *predicted, *folds),
+        (spectra, table, *_fit_items(textures), *predicted, *folds),
         outcomes=(
             *simplification_outcomes(gfc),
             *described(left_out_outcomes(left_out)),
@@ -93,10 +94,15 @@ def model_section(textures: Sequence[TextureResult], gfc: pd.DataFrame) -> Secti
     )
 
 
-def _example(textures: Sequence[TextureResult]) -> TextureResult:
-    """The first texture that lost a layer, else the first."""
-    lost = (result for result in textures if not result.simplification.identical)
-    return next(lost, textures[0])
+def _example(textures: Sequence[TextureResult]) -> int:
+    """The number of the first texture that lost a layer, else of the first."""
+    lost = (n for n, result in enumerate(textures) if not result.simplification.identical)
+    return next(lost, 0)
+
+
+def _stem(result: TextureResult, number: int) -> str:
+    """Of the names of a texture's files."""
+    return f"{number + 1}_{file_stem(result.texture)}"
 
 
 def _fit_items(textures: Sequence[TextureResult]) -> tuple[Item, ...]:
@@ -191,7 +197,7 @@ def _model_tiles(gfc: pd.DataFrame) -> tuple[tuple[str, str], ...]:
 
 def _texture_fold(result: TextureResult, *, number: int, drawn: bool) -> Fold:
     """Everything on a texture; without the spectra where the chapter begins with them."""
-    stem = f"{number + 1}_{file_stem(result.texture)}"
+    stem = _stem(result, number)
     verdicts = Table(
         f"verdicts_{stem}",
         f"{result.texture}: verdict on each layer",

@@ -229,7 +229,7 @@ def test_the_supplement_is_a_file_of_its_own(folder, shown):
     assert tables == {name for name in shown.identifiers if name.startswith("table-")}
     pictures = {name for name in behind.identifiers if name.startswith("figure-")}
     whole = {name for name in shown.identifiers if name.startswith("figure-")}
-    opening = {"figure-ratings", "figure-threshold_example", "figure-planted_course"}
+    opening = {"figure-ratings", "figure-paper", "figure-planted_course"}
     assert opening <= whole - pictures
     assert "SIMULATED" in behind.text
     html = (folder / "report.html").read_text(encoding="utf-8")
@@ -309,14 +309,14 @@ def test_names_that_no_font_has_are_told_once(tmp_path, ratings, monkeypatch):
 
 def test_links_lead_somewhere(shown):
     anchors = [reference[1:] for reference in shown.references if reference.startswith("#")]
-    assert len(anchors) == 12
+    assert len(anchors) == 13
     assert set(anchors) <= set(shown.identifiers)
     assert len(shown.identifiers) == len(set(shown.identifiers))
 
 
 def test_every_figure_is_inline_and_beside_the_report(folder, shown):
     pictures = {path.stem: path.read_bytes() for path in (folder / "figures").glob("*.png")}
-    assert len(pictures) == 2 * 2 + 2 + 7
+    assert len(pictures) == 2 * 2 + 2 + 7 + 1
     inline = {
         base64.b64decode(reference.split(",", 1)[1])
         for reference in shown.references

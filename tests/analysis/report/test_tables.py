@@ -31,6 +31,8 @@ from analysis.chapters.confusions.section import (
 from analysis.chapters.hand.statistics import HAND_TEST_COLUMNS
 from analysis.chapters.models.section import model_section
 from analysis.chapters.oddity.section import ODDITY_COLUMNS, oddity_section
+from analysis.chapters.paper.findings import FINDING_COLUMNS, of_answers
+from analysis.chapters.paper.section import paper_section
 from analysis.chapters.parameters.section import parameter_section
 from analysis.chapters.planted.section import planted_section
 from analysis.chapters.ratings import section as ratings_chapter
@@ -96,6 +98,7 @@ pytestmark = pytest.mark.usefixtures("few_draws")
 
 PAGE = Path(analysis.page.page.__file__)
 DECLARED = {
+    "paper": FINDING_COLUMNS,
     "claims": VERDICT_COLUMNS,
     "claim_tests": CLAIM_COLUMNS,
     "people": PEOPLE_COLUMNS,
@@ -229,6 +232,7 @@ def tables(results, ratings, choices, found) -> list[Table]:
             simulated=True,
         ),
         reliability(ratings, choices),
+        paper_section(of_answers(judged, responses.answers), simulated=True),
         planted_section(textures),
         chart_section(chart_of([judge(surface, methods=("joint, 1 layer", "truth"))], turns=1)),
         scene_section([compiled_example()]),
