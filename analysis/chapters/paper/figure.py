@@ -15,7 +15,7 @@ from analysis.chapters.paper.findings import (
     REPLICATED,
     PaperFinding,
 )
-from analysis.page.drawing import BLACK, BLUE, GREY, ORANGE, VERMILLION, stamp_if_simulated
+from analysis.page.drawing import BLACK, BLUE, GREY, ORANGE, VERMILLION
 
 # Distinguished by shape as well as by colour.
 MARKS = {
@@ -70,5 +70,8 @@ def figure_findings(findings: Sequence[PaperFinding], *, simulated: bool) -> Fig
         [row + 0.75 for row in range(len(rows) - 1)], -0.6, len(kinds) - 0.4, color=GREY, lw=0.3
     )
     figure.legend(loc="outside lower center", ncols=len(MARKS), frameon=False, fontsize=9)
-    stamp_if_simulated(ax, simulated)
+    if simulated:
+        figure.text(
+            0.99, 0.01, "SIMULATED", ha="right", color=VERMILLION, weight="bold", fontsize=9
+        )
     return figure

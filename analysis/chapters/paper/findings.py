@@ -156,7 +156,7 @@ def of_models(centroids: pd.DataFrame, gfc: pd.DataFrame) -> list[PaperFinding]:
                 where="table 3",
                 kind="GFC after dropping one layer",
                 texture=str(texture),
-                said="changes by less than 0.01 where few layers are dropped",
+                said="changes by less than 0.01",
                 unit="GFC30",
                 ours=change,
                 low=nan,
@@ -258,25 +258,26 @@ def _rates(values: pd.DataFrame, *, chance: float) -> Iterator[PaperFinding]:
             model: own[column].to_numpy(dtype=float)
             for model, column in zip(MODELS, ("reference", "other"), strict=True)
         }
-        said: list[tuple[str, str, Floats, float, int]] = []
+        often, right = "how often recognised", "right answers"
+        said: list[tuple[str, str, str, Floats, float, int]] = []
         if texture == WITHOUT_ERROR:
             errors = (shares["full"] == 1.0).astype(np.float64)
-            said.append(("most without an error", "participants", errors, 0.5, 1))
+            said.append((often, "most without an error", "participants", errors, 0.5, 1))
         elif texture not in WELL_RECOGNISED:
-            said.append(("full model below 40 %", "right answers", shares["full"], 0.4, -1))
+            said.append((often, "full model below 40 %", right, shares["full"], 0.4, -1))
         if texture == "MDF":
-            words = "simplified model above 60 %"
-            said.append((words, "right answers", shares["simplified"], 0.6, 1))
+            rates = shares["simplified"]
+            said.append(("if simplified", "simplified model above 60 %", right, rates, 0.6, 1))
         said += [
-            (f"{model} model below chance", "right answers", shares[model], chance, -1)
+            ("below chance", f"{model} model below chance", right, shares[model], chance, -1)
             for name, model in BELOW_CHANCE
             if name == texture
         ]
-        for words, of, rates, at, sign in said:
+        for kind, words, of, rates, at, sign in said:
             mean, low, high = _interval(rates)
             yield PaperFinding(
                 where="figure 11",
-                kind="below chance" if "chance" in words else "recognised as often",
+                kind=kind,
                 texture=texture,
                 said=words,
                 unit=f"% of {of}",
