@@ -19,6 +19,7 @@ from analysis.statistics.compared_answers import chance_of
 from analysis.statistics.equivalence import EQUAL_ON_AVERAGE, EQUIVALENT
 from analysis.statistics.verdicts import ClaimFound
 from modeling.arrays import Floats
+from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.columns import Column
 
 Outcome = Literal["replicated", "contradicted", "open", "not comparable"]
@@ -98,14 +99,18 @@ def of_answers(
     Parameters
     ----------
     found : sequence of ClaimFound
-        With a verdict; of full and simplified models.
+        With a verdict. Of each measure the first claim on full and simplified models counts, and
+        of right answers the first on a task that asks for a texture.
     answers : mapping of task to DataFrame
         `Responses.answers`.
     """
     findings: list[PaperFinding] = []
+    compared: dict[str, ClaimFound] = {}
     for one in found:
-        if one.claim.models != MODELS or one.claim.measure not in DIFFER:
-            continue
+        asked = ANSWER_TABLES[one.claim.task]
+        if one.claim.models == MODELS and (asked.scales or asked.is_identification):
+            compared.setdefault(one.claim.measure, one)
+    for one in (compared[measure] for measure in DIFFER if measure in compared):
         findings += _differences(one)
         if one.claim.measure == "magnitude_similarity":
             findings += _ratings(one.values)
