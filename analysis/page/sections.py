@@ -100,7 +100,8 @@ class Section:
     @property
     def supplement(self) -> tuple[Item, ...]:
         """Everything but the opening."""
-        return tuple(item for item in self.items if item is not self.opening)
+        opening = self.opening
+        return tuple(item for item in self.items if item is not opening)
 
     @property
     def findings(self) -> tuple[str, ...]:

@@ -111,6 +111,14 @@ def standard_error(values: Floats) -> float:
     return float(stats.sem(values)) if values.size > 1 else float("nan")
 
 
+def t_interval(values: Floats) -> tuple[float, float]:
+    """The 95 % interval of a mean by Student's t; NaN below two values."""
+    if values.size < 2:
+        return float("nan"), float("nan")
+    half = stats.sem(values) * stats.t.ppf((1 + CONFIDENCE) / 2, values.size - 1)
+    return float(values.mean() - half), float(values.mean() + half)
+
+
 def d_z_interval(t: float, n: int, *, confidence: float = CONFIDENCE) -> tuple[float, float]:
     """Confidence interval of d_z = t/√n by inverting the noncentral t distribution.
 

@@ -17,6 +17,7 @@ from scipy import stats
 from analysis.labels import MODELS, unit_of
 from analysis.statistics.compared_answers import chance_of
 from analysis.statistics.equivalence import EQUAL_ON_AVERAGE, EQUIVALENT
+from analysis.statistics.paired import mean, t_interval
 from analysis.statistics.verdicts import ClaimFound
 from modeling.arrays import Floats
 from modeling.files.answer_tables import ANSWER_TABLES
@@ -241,7 +242,8 @@ def detectable(participants: int) -> float:
 def _ratings(values: pd.DataFrame) -> Iterator[PaperFinding]:
     """Whether full models are rated above 50."""
     for texture, own in _of_paper(values):
-        mean, low, high = _interval(own["reference"].to_numpy(dtype=float))
+        ratings = own["reference"].to_numpy(dtype=float)
+        low, high = t_interval(ratings)
         sign = -1 if texture == NOT_ABOVE_HALF else 1
         yield PaperFinding(
             where="figure 9a",
@@ -249,7 +251,7 @@ def _ratings(values: pd.DataFrame) -> Iterator[PaperFinding]:
             texture=texture,
             said="not above 50" if sign < 0 else "above 50",
             unit="points of 100",
-            ours=mean,
+            ours=mean(ratings),
             low=low,
             high=high,
             outcome=_outcome(low, high, at=50.0, sign=sign),
@@ -279,14 +281,14 @@ def _rates(values: pd.DataFrame, *, chance: float) -> Iterator[PaperFinding]:
             if name == texture
         ]
         for kind, words, of, rates, at, sign in said:
-            mean, low, high = _interval(rates)
+            low, high = t_interval(rates)
             yield PaperFinding(
                 where="figure 11",
                 kind=kind,
                 texture=texture,
                 said=words,
                 unit=f"% of {of}",
-                ours=100 * mean,
+                ours=100 * mean(rates),
                 low=100 * low,
                 high=100 * high,
                 outcome=_outcome(low, high, at=at, sign=sign),
@@ -297,17 +299,18 @@ def _confusions(answers: pd.DataFrame) -> Iterator[PaperFinding]:
     """Whether canvas and polyester are taken for each other."""
     for texture, other in (CONFUSED, CONFUSED[::-1]):
         own = answers[(answers["texture"] == texture) & answers["answer"].notna()]
-        if own.empty or "layout" not in own:
+        if own.empty:
             continue
         taken = (own["answer"] == other).astype(float).groupby(own["participant_id"]).mean()
-        mean, low, high = _interval(np.array(taken, dtype=np.float64))
+        shares = np.array(taken, dtype=np.float64)
+        low, high = t_interval(shares)
         yield PaperFinding(
             where="figure 10",
             kind="confused",
             texture=texture,
             said=f"taken for {other} above chance",
             unit="% of answers",
-            ours=100 * mean,
+            ours=100 * mean(shares),
             low=100 * low,
             high=100 * high,
             outcome=_outcome(low, high, at=1 / len(PAPER_TEXTURES), sign=1),
@@ -337,15 +340,6 @@ def _of_paper(values: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
     complete = values[values["texture"].isin(PAPER_TEXTURES)].dropna(subset=["reference", "other"])
     for texture, own in complete.groupby("texture", sort=False):
         yield str(texture), own
-
-
-def _interval(values: Floats) -> tuple[float, float, float]:
-    """Mean and 95 % interval by Student's t over participants; without spread no interval."""
-    if len(values) < 2:
-        return float(np.mean(values)) if len(values) else nan, nan, nan
-    mean, error = float(values.mean()), float(stats.sem(values))
-    half = float(stats.t.ppf(1 - ALPHA / 2, len(values) - 1)) * error
-    return mean, mean - half, mean + half
 
 
 def finding_table(findings: Sequence[PaperFinding]) -> pd.DataFrame:

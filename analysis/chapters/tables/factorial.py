@@ -16,7 +16,7 @@ import pandas as pd
 from scipy import linalg, stats
 
 from analysis.columns import P
-from analysis.statistics.paired import CONFIDENCE, holm, paired_test
+from analysis.statistics.paired import CONFIDENCE, holm, paired_test, t_interval
 from modeling import InputError
 from modeling.arrays import Floats
 from modeling.files.columns import Column
@@ -111,7 +111,7 @@ def participant_cells(
             low, high = _wilson(mean, trials)
         else:
             values = np.repeat(cell[measure].to_numpy(dtype=float), cell["count"])
-            low, high = _t_interval(values)
+            low, high = t_interval(values)
         row: dict[str, object] = {"participant_id": who, **dict(zip(factors, levels, strict=True))}
         row |= {"condition": _condition(levels), "trials": trials}
         rows.append(row | {"mean": mean, "ci_low": low, "ci_high": high})
@@ -134,7 +134,7 @@ def cell_means(cells: pd.DataFrame, factors: Sequence[str]) -> pd.DataFrame:
     rows = []
     for condition, cell in cells.groupby("condition", sort=False):
         values = cell["mean"].to_numpy(dtype=float)
-        low, high = _t_interval(values)
+        low, high = t_interval(values)
         row: dict[str, object] = {factor: cell[factor].iloc[0] for factor in factors}
         row |= {"condition": condition, "n": values.size, "mean": float(values.mean())}
         rows.append(row | {"ci_low": low, "ci_high": high})
@@ -348,7 +348,7 @@ def overall_mean(cells: pd.DataFrame) -> tuple[float, float, float]:
         From `participant_cells`.
     """
     people = cells.groupby("participant_id")["mean"].mean().to_numpy(dtype=float)
-    return float(people.mean()), *_t_interval(people)
+    return float(people.mean()), *t_interval(people)
 
 
 def in_order(level: object) -> tuple[bool, float, str]:
@@ -373,10 +373,3 @@ def _wilson(share: float, trials: int) -> tuple[float, float]:
 
     low, high = proportion_confint(share * trials, trials, alpha=1 - CONFIDENCE, method="wilson")
     return float(low), float(high)
-
-
-def _t_interval(values: Floats) -> tuple[float, float]:
-    if values.size < 2:
-        return float("nan"), float("nan")
-    half = stats.sem(values) * stats.t.ppf((1 + CONFIDENCE) / 2, values.size - 1)
-    return float(values.mean() - half), float(values.mean() + half)
