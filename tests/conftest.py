@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
 from tests.extras import is_to_collect, not_collected, skip_what_lacks_packages
+from tests.audio_lock import LockWatch
 from tests.real_time import BareProcess, needs_time, repeat_where_the_machine_stood_still
 
 # A slow machine is no counterexample: hypothesis must not fail a test for its wall time.
@@ -48,6 +49,13 @@ def pytest_terminal_summary(
 ) -> None:
     if config.getoption("--no-skips") and terminalreporter.stats.get("skipped"):
         terminalreporter.write_line("error: expected every test to run, got skipped ones.")
+    for kept in _LOCK.freed:
+        terminalreporter.write_line(f"note: JACK's lock was kept for seconds, and freed: {kept}")
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    if not hasattr(session.config, "workerinput"):  # once, beside all workers
+        _LOCK.begin()
 
 
 @pytest.hookimpl(trylast=True)
@@ -58,6 +66,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 
 _BARE = BareProcess()
+_LOCK = LockWatch()
 
 
 def pytest_report_header() -> str:
@@ -96,6 +105,7 @@ def pytest_runtest_setup(item: pytest.Item) -> Iterator[None]:
 
 def pytest_unconfigure() -> None:
     _BARE.close()
+    _LOCK.close()
 
 
 @pytest.fixture(scope="session")
