@@ -25,8 +25,8 @@ from hypothesis import settings
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from tests.extras import is_to_collect, not_collected, skip_what_lacks_packages
 from tests.audio_lock import LockWatch
+from tests.extras import is_to_collect, not_collected, skip_what_lacks_packages
 from tests.real_time import BareProcess, needs_time, repeat_where_the_machine_stood_still
 
 # A slow machine is no counterexample: hypothesis must not fail a test for its wall time.

@@ -36,18 +36,6 @@ def test_the_lock_pins_hashes_and_names_no_address() -> None:
         assert "--hash=sha256:" in requirement, requirement.splitlines()[0]
 
 
-def test_the_lines_of_the_readme_end_in_a_figure(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    for block in text.split("```python\n")[1:]:
-        code = block.split("```")[0]
-        assert len([line for line in code.splitlines() if line.strip()]) <= 10
-        exec(compile(code, "README.md", "exec"), {})
-    assert (tmp_path / "polyester.png").read_bytes().startswith(b"\x89PNG")
-
-
 PAGES = sorted(
     path.relative_to(ROOT).as_posix()
     for path in (*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"))

@@ -12,6 +12,14 @@ from typing import Any
 import pytest
 import typer
 
+from experiments.observers.whole_study import simulate_study
+from experiments.study.models import ModelSets
+from experiments.study.study import Study
+from experiments.study.task_plan import TaskPlan
+from modeling import Threshold, simplify
+from modeling.files.claims import ClaimSection, PlanSection
+from rig.twin import SimulatedRig
+from stimuli.planted.textures import planted_texture
 from tactileq import app
 
 SMALL_STUDY = """
@@ -94,3 +102,47 @@ def main(
         return subprocess.CompletedProcess(words, int(end.value.code or 0), told.out, told.err)
 
     return call
+
+
+@pytest.fixture(scope="session")
+def simulated(once_per_run: Any) -> Path:
+    """The data of a simulated study of three surfaces with one claim."""
+    return once_per_run("analyzed-study", _simulated_in)
+
+
+def _simulated_in(folder: Path) -> Path:
+    truths = {texture: planted_texture(texture) for texture in ("leather", "MDF", "PVC")}
+    threshold = Threshold.shipped("codec")
+    fewer = {
+        name: simplify(truth, threshold, criterion="paper-fft").model
+        for name, truth in truths.items()
+    }
+    claim = ClaimSection(
+        name="as strong",
+        task="absolute",
+        measure="magnitude_similarity",
+        models=("full", "simplified"),
+        bounds=(-7.5, 7.5),
+        test="equivalence",
+    )
+    study = Study(
+        name="Three surfaces",
+        seed=3,
+        textures=tuple(truths),
+        trays={"leather": "A", "MDF": "B", "PVC": "C"},
+        tasks={
+            "absolute": TaskPlan(participants=4, schedule="interleaved", training_trials=1),
+            "relative": TaskPlan(participants=2, schedule="by-day", repeats=1, training_trials=1),
+        },
+        plan=PlanSection(claims=(claim,), exclusions=("Whoever presses nothing.",)),
+    )
+    simulate_study(
+        study,
+        real=truths,
+        models=ModelSets(sets={"full": truths, "simplified": fewer}),
+        rig=SimulatedRig(seed=1),
+        data_folder=folder / "data",
+        seed=7,
+        threshold=threshold,
+    )
+    return folder / "data"

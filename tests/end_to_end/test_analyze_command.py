@@ -12,15 +12,7 @@ import pandas as pd
 import pytest
 
 from analysis.answers import loading
-from experiments.observers.whole_study import simulate_study
-from experiments.study.models import ModelSets
-from experiments.study.study import Study
-from experiments.study.task_plan import TaskPlan
-from modeling import Threshold, simplify
-from modeling.files.claims import ClaimSection, PlanSection
 from modeling.files.hashes import sha256_of_paths
-from rig.twin import SimulatedRig
-from stimuli.planted.textures import planted_texture
 from tactileq.commands.analyze import _later_plan, read_answers
 
 
@@ -30,7 +22,6 @@ def quick(undrawn: None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("analysis.chapters.confusions.similarity_choice.SIMULATIONS", 9)
 
 
-TEXTURES = ("leather", "MDF", "PVC")
 LATER = """
 name = "Three surfaces"
 seed = 3
@@ -53,50 +44,6 @@ test = "equivalence"
 def data(simulated: Path, tmp_path: Path) -> Path:
     """A copy of the simulated study."""
     return shutil.copytree(simulated, tmp_path / "data")
-
-
-@pytest.fixture(scope="module")
-def simulated(once_per_run: Any) -> Path:
-    """A simulated study with one claim."""
-    return once_per_run("analyzed-study", simulated_in)
-
-
-def simulated_in(folder: Path) -> Path:
-    truths = {texture: planted_texture(texture) for texture in TEXTURES}
-    threshold = Threshold.shipped("codec")
-    fewer = {
-        name: simplify(truth, threshold, criterion="paper-fft").model
-        for name, truth in truths.items()
-    }
-    claim = ClaimSection(
-        name="as strong",
-        task="absolute",
-        measure="magnitude_similarity",
-        models=("full", "simplified"),
-        bounds=(-7.5, 7.5),
-        test="equivalence",
-    )
-    study = Study(
-        name="Three surfaces",
-        seed=3,
-        textures=TEXTURES,
-        trays={"leather": "A", "MDF": "B", "PVC": "C"},
-        tasks={
-            "absolute": TaskPlan(participants=4, schedule="interleaved", training_trials=1),
-            "relative": TaskPlan(participants=2, schedule="by-day", repeats=1, training_trials=1),
-        },
-        plan=PlanSection(claims=(claim,), exclusions=("Whoever presses nothing.",)),
-    )
-    simulate_study(
-        study,
-        real=truths,
-        models=ModelSets(sets={"full": truths, "simplified": fewer}),
-        rig=SimulatedRig(seed=1),
-        data_folder=folder / "data",
-        seed=7,
-        threshold=threshold,
-    )
-    return folder / "data"
 
 
 def claims(folder: Path) -> pd.DataFrame:

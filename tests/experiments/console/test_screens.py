@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -81,27 +82,51 @@ def test_faults_of_a_page_are_found() -> None:
     ]
 
 
-def test_on_no_page_is_anything_cut_or_covered(display: str) -> None:
+WINDOWS = {
+    f"{language}:{w}x{h}": [-w / 2, -h / 2, w / 2, h / 2]
+    for language in languages()
+    for w, h in SIZES
+}
+
+
+@pytest.fixture
+def pages(display: str, once_per_run: Any) -> list[dict[str, Any]]:
     """All languages one after another in one process: PsychoPy takes seconds to start."""
-    windows = {
-        f"{language}:{w}x{h}": [-w / 2, -h / 2, w / 2, h / 2]
-        for language in languages()
-        for w, h in SIZES
+
+    def made(folder: Path) -> list[dict[str, Any]]:
+        shown = subprocess.run(
+            [sys.executable, str(SCRIPT), "-", *WINDOWS],
+            env={**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+            timeout=400,
+        )
+        assert shown.returncode == 0, shown.stderr[-2000:]
+        return [json.loads(line) for line in shown.stdout.splitlines()]
+
+    return once_per_run("pages-of-the-console", made)
+
+
+def test_every_page_stands_in_the_docs_under_its_title(pages: list[dict[str, Any]]) -> None:
+    text = (ROOT / "docs/participants.md").read_text(encoding="utf-8")
+    shown = re.findall(r"!\[([^]]*)\]\(participants/(\S+)\.png\)", text)
+    expected = {
+        page["page"]: page["texts"][1][0]  # below the line on a pilot
+        for page in pages
+        if page["screen"] == "en:1024x768"
     }
-    shown = subprocess.run(
-        [sys.executable, str(SCRIPT), "-", *windows],
-        env={**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=400,
-    )
-    assert shown.returncode == 0, shown.stderr[-2000:]
-    pages = [json.loads(line) for line in shown.stdout.splitlines()]
-    assert len(pages) == len(windows) * len({page["page"] for page in pages})
-    assert {page["screen"] for page in pages} == set(windows)
+    assert len(shown) == len(expected) > 30
+    assert {name: title for title, name in shown} == expected
+    there = (ROOT / "docs/participants").glob("*.png")
+    assert {picture.stem for picture in there} == set(expected)
+
+
+def test_on_no_page_is_anything_cut_or_covered(pages: list[dict[str, Any]]) -> None:
+    assert len(pages) == len(WINDOWS) * len({page["page"] for page in pages})
+    assert {page["screen"] for page in pages} == set(WINDOWS)
     for page in pages:
         where = (page["screen"], page["page"])
-        assert faults(page, windows[page["screen"]]) == [], where
+        assert faults(page, WINDOWS[page["screen"]]) == [], where
         told = [words for words, _ in page["texts"]]
         assert tells_nothing(told), where
         if page["page"] in UNFOCUSED:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import select
 import shutil
 import struct
@@ -20,7 +21,7 @@ import numpy as np
 import pytest
 
 from benches.rendering.rivals import layered_texture
-from modeling import Renderer, TextureModel
+from modeling import Limits, Renderer, TextureModel
 from modeling.engines import SWITCH
 from modeling.rendering.noise import stream_key
 from modeling.rendering.plan import RenderPlan, plan_for
@@ -30,6 +31,7 @@ from stimuli.exports.scene_header import scene_header
 from stimuli.planted.textures import planted_texture
 
 HERE = Path(__file__).parent
+DOCS = HERE.parents[2] / "docs"
 NEEDED = ("arm-none-eabi-gcc", "qemu-system-arm", "prlimit")
 pytestmark = pytest.mark.skipif(
     not all(map(shutil.which, NEEDED)),
@@ -41,6 +43,7 @@ MDF = planted_texture("MDF")
 SEED = 5
 SWITCH_AT = 2560  # of a scene: while the hand is lifted off
 SAMPLES, HOLD = 5000, 5  # readings at 1 kHz, samples at 5 kHz
+BAND = 0.2  # for other versions of the compiler; a count is the same at every run
 PATIENCE_S = 60.0  # an answer takes a second or two
 TICK_NS = 40
 COUNTING = ("-icount", "shift=0")  # every instruction takes 1 ns of the board's time
@@ -106,13 +109,13 @@ def built_with(header: Path, board: Board, *options: str) -> Path:
     return program
 
 
-def code_bytes(program: Path) -> int:
-    """Of code and tables in flash memory."""
+def sizes(program: Path) -> tuple[int, int]:
+    """Bytes of code and tables in flash memory, and in RAM."""
     run = subprocess.run(
         ["arm-none-eabi-size", program], capture_output=True, text=True, check=True
     )
-    text, data = run.stdout.splitlines()[1].split()[:2]
-    return int(text) + int(data)
+    text, data, bss = (int(part) for part in run.stdout.splitlines()[1].split()[:3])
+    return text + data, data + bss
 
 
 @contextmanager
@@ -248,7 +251,7 @@ def trials(
         program = built(tmp_path_factory.mktemp("program"), request.param, "float", *options)
         with running(request.param, program, *COUNTING) as port:
             answer = asked(port, "float", per_call=32)
-        found[way] = Trial(answer.samples, code_bytes(program), answer.per_sample)
+        found[way] = Trial(answer.samples, sizes(program)[0], answer.per_sample)
     told = ", ".join(f"{way} {t.per_sample:.0f} ({t.code_bytes} bytes)" for way, t in found.items())
     print(f"\n{request.param.machine}, instructions per sample, 4 layers at 5 kHz: {told}")
     return found
@@ -275,9 +278,38 @@ def test_the_default_takes_the_fewest_instructions(trials: dict[str, Trial]) -> 
     assert 50 < default < 900
 
 
+def table_of_the_page() -> dict[int, list[int]]:
+    """By layers, from docs/micro-controller.md: instructions, flash and RAM at 5 and at 48 kHz."""
+    page = (DOCS / "micro-controller.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (\d+) \|((?: \d+ \|){6})$", page, flags=re.MULTILINE)
+    return {
+        int(layers): [int(cell) for cell in re.findall(r"\d+", cells)] for layers, cells in rows
+    }
+
+
+@pytest.mark.parametrize("layers", [1, 2, 3, 4, 6, 8])
+@pytest.mark.parametrize(("column", "rate_hz"), [(0, None), (3, 48_000.0)])
+def test_instructions_and_bytes_are_those_of_the_page(
+    tmp_path: Path, layers: int, column: int, rate_hz: float | None
+) -> None:
+    header, board = tmp_path / "canvas.h", DOCS / "micro-controller"
+    limits = Limits(peak=5, rms=1, duration_s=60)
+    texture, options = layered_texture(layers), {"rate_hz": rate_hz, "limits": limits}
+    write_c_header(header, texture, single=True, name="canvas", **options)  # type: ignore[arg-type]
+    build = ["arm-none-eabi-gcc", *EXACT, *STRICT, "-mthumb", *M4.options, f"-I{tmp_path}"]
+    loop = tmp_path / "main.o"
+    subprocess.run([*build, f"-I{board}", "-c", board / "main.c", "-o", loop], check=True)
+    flash, ram = sizes(loop)
+    instructions, *found = table_of_the_page()[layers][column : column + 3]
+    assert [flash, ram] == pytest.approx(found, rel=BAND)
+    if layers in (1, 8):
+        with running(M4, built_with(header, M4, "-DTEXTURE=texture_canvas"), *COUNTING) as port:
+            answer = asked(port, "float", per_call=5)
+        assert answer.per_sample == pytest.approx(instructions, rel=BAND)
+
+
 # Layers and samples from one update to the next, by output rate.
 COSTS = {5000.0: [(1, 5), (3, 5), (8, 5), (8, 32)], 48_000.0: [(1, 48)]}
-BAND = 0.2  # for other versions of the compiler; a count is the same at every run
 
 
 def instructions_per_operation(folder: Path, board: Board, precision: str) -> list[float]:

@@ -63,10 +63,10 @@ def test_the_recipe_of_the_docs() -> None:
     assert (recipe.rates_hz, recipe.seeds, recipe.format) == ((5000, 48_000), (1, 2), "pcm24")
 
 
-def test_the_recipe_of_the_readme(tmp_path: Path, vibrator: Vibrator) -> None:
+def test_the_recipe_of_the_page(tmp_path: Path, vibrator: Vibrator) -> None:
     """With the files that it names, a set can be made of it."""
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    (text,) = re.findall("```toml\n(.*?)```", readme, flags=re.DOTALL)
+    page = (ROOT / "docs/models.md").read_text(encoding="utf-8")
+    (text,) = re.findall("```toml\n(.*?)```", page, flags=re.DOTALL)
     for folder in ("models", "simplified"):
         planted_texture("canvas").save(tmp_path / folder / "canvas.json")
     (tmp_path / "hand.csv").write_text("time_s,speed_mm_s,force_n\n0,0,1\n1,200,1\n")
