@@ -21,34 +21,32 @@ Result = TypeVar("Result")
 
 
 class Benches(NamedTuple):
-    """Scenes, the reduced chart's textures and the reduced atlas's columns, done by others."""
+    """The reduced chart's textures and the reduced atlas's columns, done by others."""
 
-    scenes: Iterable[Any]
     judged: Iterable[Judged]
     examined: Iterable[Examined]
 
     @classmethod
-    def begun(cls, mapped: Mapped, made: Sequence[TextureResult]) -> Benches:
+    def begun(cls, mapped: Mapped) -> Benches:
         """All of them, from now on."""
         from benches.atlas.edges import columns_of, examine_column
         from benches.chart.judging import judge
         from benches.chart.methods import BRIEF
         from benches.chart.surfaces import FEW_SURFACES, simulated_sources
-        from benches.scenes.examples import DEMO_EXAMPLES, compile_examples, drawn_example
 
-        models = {result.texture: result.model for result in made}
         cases = own_cases()
         return cls(
-            # One call, as what has one item alone is done by this process.
-            mapped(_done, [partial(compile_examples, models, DEMO_EXAMPLES), drawn_example]),
             mapped(partial(judge, methods=BRIEF), simulated_sources(FEW_SURFACES)),
             mapped(partial(examine_column, cases, full=False), columns_of(cases, full=False)),
         )
 
-    def sections(self, rivals: Iterable[ARModel]) -> list[Section]:
+    def sections(
+        self, scenes: Iterable[Any], rivals: Iterable[ARModel], *, mapped: Mapped
+    ) -> list[Section]:
         """What scenes need, speed against accuracy, and where methods fail, when all is done.
 
-        `rivals` are the AR models of the planted textures' recordings.
+        `scenes` are those of `begun_scenes`, `rivals` the AR models of the planted textures'
+        recordings.
         """
         from benches.atlas.section import stability_section
         from benches.chart.chart import chart_of
@@ -60,17 +58,24 @@ class Benches(NamedTuple):
 
         surfaces = {m.texture: Surface(PlantedSurface(m.texture), m) for m in rivals}
         with progress("Compiling scenes", 2) as advance:
-            compiled, drawn = reported(
-                self.scenes, advance, lambda found: found[0].compiled.scene.name
-            )
-        scenes = scene_section([*((one, surfaces) for one in compiled), drawn])
+            compiled, drawn = reported(scenes, advance, lambda found: found[0].compiled.scene.name)
+        compared = scene_section([*((one, surfaces) for one in compiled), drawn], mapped=mapped)
         with progress("Speed against accuracy", FEW_SURFACES.drawn) as advance:
             judged = list(reported(self.judged, advance, lambda one: one.source.name))
         with progress("Where methods fail", len(own_cases())) as advance:
             examined = list(reported(self.examined, advance, lambda one: one.case.family))
         # Rendering is timed now that no other process works.
         chart = chart_section(chart_of(judged, turns=CHART_TURNS))
-        return [scenes, chart, stability_section(examined)]
+        return [compared, chart, stability_section(examined)]
+
+
+def begun_scenes(mapped: Mapped, made: Sequence[TextureResult]) -> Iterable[Any]:
+    """Scenes of these models, and one of drawn surfaces, from now on."""
+    from benches.scenes.examples import DEMO_EXAMPLES, compile_examples, drawn_example
+
+    models = {result.texture: result.model for result in made}
+    # One call, as what has one item alone is done by this process.
+    return mapped(_done, [partial(compile_examples, models, DEMO_EXAMPLES), drawn_example])
 
 
 def own_cases() -> Sequence[Case]:

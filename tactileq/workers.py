@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import os
 import signal
@@ -120,8 +121,12 @@ def _end_with(parent: int) -> None:
 
 
 def collect_less_often() -> None:
-    """Look for garbage less often: the libraries, once loaded, are a million objects to look at."""
+    """Look for garbage less often: the libraries, once loaded, are a million objects to look at.
+
+    At the process's end not at all, which would take a second.
+    """
     gc.set_threshold(100_000, 20, 20)
+    atexit.register(gc.freeze)
 
 
 def _watch(parent: int) -> None:

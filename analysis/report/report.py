@@ -72,7 +72,7 @@ SUPPLEMENT_NAME = "supplement.html"
 # About answers and models, either of which a report may lack.
 STUDY_CHAPTERS = ("paper",)
 # Of the time that a report of a whole study takes.
-ANSWERS_SHARE, PICTURES_SHARE = 0.5, 0.25
+MODELS_SHARE, PICTURES_SHARE = 0.25, 0.25
 ENOUGH_PICTURES = 3  # to have other processes begin with them
 
 
@@ -135,16 +135,23 @@ def write_report(
     rng = np.random.default_rng(seed)
     if responses is not None:
         responses = _with_identical(responses, textures)
-    # Begun first: other processes sample, compare models and draw while this one goes on.
+    # Begun first: other processes compare models, sample and draw while this one goes on, with the
+    # chapters on models, as the samplers take longest.
     streams = rng.spawn(len(textures))
-    claims = None if responses is None else ClaimsBegun.of(responses, rng=rng, mapped=mapped)
     compared = comparisons(textures, streams, mapped=mapped)
+    claims = None if responses is None else ClaimsBegun.of(responses, rng=rng, mapped=mapped)
     drawing = _Drawing(mapped)
     drawing.begin(benches)
+    on_models: list[Section] = []
     sections: list[Section] = []
     answered, modelled = None, None
+    if textures:
+        modelled = _modelled(textures, compared, progress=report_progress)
+        for name in MODEL_CHAPTERS:
+            report_progress(MODELS_SHARE, f"chapter on {name}")
+            on_models += drawing.begin(cast(ModelChapter, _sections_of(name))(modelled))
     if responses is not None and claims is not None:
-        report_progress(0.0, "testing the claims")
+        report_progress(MODELS_SHARE, "testing the claims")
         answered = Answered(
             responses=responses,
             found=claims.found(),
@@ -154,14 +161,11 @@ def write_report(
             planted=planted,
         )
         for number, name in enumerate(ANSWER_CHAPTERS):
-            share = ANSWERS_SHARE * (0.5 + 0.5 * number / len(ANSWER_CHAPTERS))
+            done = 0.5 + 0.5 * number / len(ANSWER_CHAPTERS)  # half of it for the claims
+            share = MODELS_SHARE + (1 - PICTURES_SHARE - MODELS_SHARE) * done
             report_progress(share, f"chapter on {name.replace('_', ' ')}")
             sections += drawing.begin(cast(AnswerChapter, _sections_of(name))(answered))
-    if textures:
-        modelled = _modelled(textures, compared, progress=report_progress)
-        for name in MODEL_CHAPTERS:
-            report_progress(1 - PICTURES_SHARE, f"chapter on {name}")
-            sections += drawing.begin(cast(ModelChapter, _sections_of(name))(modelled))
+    sections += on_models
     for name in STUDY_CHAPTERS:
         sections += drawing.begin(cast(StudyChapter, _sections_of(name))(answered, modelled))
     sections += benches
@@ -280,11 +284,10 @@ def _modelled(
     """The models, compared one by one, which takes its time."""
     gfc, driven = [], []
     for number, (result, comparison) in enumerate(zip(textures, compared, strict=True)):
-        share = ANSWERS_SHARE + (1 - PICTURES_SHARE - ANSWERS_SHARE) * number / len(textures)
-        progress(share, f"comparing models of {result.texture}")
+        progress(MODELS_SHARE * number / len(textures), f"comparing models of {result.texture}")
         gfc.append(comparison.gfc)
         driven.append(comparison.driven)
-    progress(1 - PICTURES_SHARE, "regressing parameters on speed and force")
+    progress(MODELS_SHARE, "regressing parameters on speed and force")
     return Modelled(
         textures=textures, gfc=pd.concat(gfc, ignore_index=True), driving=driving_table(driven)
     )

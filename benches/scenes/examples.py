@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.columns import SIMULATED_COLUMN
+from analysis.page.sections import Mapped
 from analysis.textures.between import RIVAL_ORDER, Truth
 from benches.chart.rival_costs import coefficients_cost
 from benches.rendering.coefficients import CoefficientTable, tabled_predictor
@@ -110,9 +111,9 @@ def drawn_example(
 
 
 def comparison_table(
-    examples: Sequence[tuple[CompiledExample, Mapping[str, Surface]]],
+    examples: Sequence[tuple[CompiledExample, Mapping[str, Surface]]], *, mapped: Mapped = map
 ) -> pd.DataFrame:
-    """Full models, least ones and the rival in each scene.
+    """Full models, least ones and the rival in each scene; `mapped` goes through the scenes.
 
     Numbers and bytes are those of all textures together (bytes of the least models with what they
     share counted once), operations those of the texture that takes most. The rival has its
@@ -123,11 +124,12 @@ def comparison_table(
     DataFrame
         The columns of `SCENE_COMPARISON_COLUMNS`, three rows per scene.
     """
-    rows = [row for pair in examples for row in _rows(*pair)]
+    rows = [row for of_scene in mapped(_rows, examples) for row in of_scene]
     return pd.DataFrame(rows)[names(SCENE_COMPARISON_COLUMNS)]
 
 
-def _rows(one: CompiledExample, surfaces: Mapping[str, Surface]) -> list[dict[str, object]]:
+def _rows(example: tuple[CompiledExample, Mapping[str, Surface]]) -> list[dict[str, object]]:
+    one, surfaces = example
     compiled = one.compiled
     judged = [
         _judged(texture, compiled.scene, surfaces[texture.texture]) for texture in compiled.textures

@@ -9,7 +9,7 @@ import pandas as pd
 from analysis.labels import ALL_TEXTURES
 from analysis.page.outcomes import Outcome, described
 from analysis.page.page import Fold, Picture, Table
-from analysis.page.sections import Section
+from analysis.page.sections import Mapped, Section
 from analysis.spectra.figures.scenes import figure_tradeoff
 from analysis.textures.scenes import (
     BEFORE_AFTER_COLUMNS,
@@ -47,14 +47,16 @@ SHOWN_STEPS = chosen(
 Example = tuple[CompiledExample, Mapping[str, Surface]]
 
 
-def scene_section(examples: Sequence[Example]) -> Section:
+def scene_section(examples: Sequence[Example], *, mapped: Mapped = map) -> Section:
     """The shipped scenes as compiled; the first one is drawn.
 
     Parameters
     ----------
     examples : sequence of (CompiledExample, mapping of texture to Surface)
+    mapped : callable
+        How the scenes are gone through; it changes no result.
     """
-    comparison = comparison_table(examples)
+    comparison = comparison_table(examples, mapped=mapped)
     simulated = bool(comparison["simulated"].any())
     steps, textures = _step_table(examples, simulated), _texture_table(examples, simulated)
     return Section(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from tactileq.commands.simulate import run_study
 from tactileq.commands.stimuli import render_set
-from tactileq.demo_benches import Benches, reported
+from tactileq.demo_benches import Benches, begun_scenes, reported
 from tactileq.options import Out, Seed
 from tactileq.own_results import check_own_results
 from tactileq.printing import progress, share_of
@@ -39,6 +39,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
     from modeling import Threshold
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
+    from modeling.threads import one_linear_algebra_thread
     from stimuli.planted.textures import TEXTURES
 
     seen = check_own_results(out, "demo")
@@ -46,12 +47,15 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
     # Of the shipped tables the one by which most simulated textures have a layer to drop.
     threshold = Threshold.named("mobile")
     print("A study in silico: simulated surfaces, simulated participants, the real program.")
-    with replace_folder(out, seen) as fresh, mapping(jobs=JOBS) as mapped:
+    # Every core has a process of its own to do.
+    alone = one_linear_algebra_thread()
+    with replace_folder(out, seen) as fresh, mapping(jobs=JOBS) as mapped, alone:
         record = partial(demo_texture, folder=fresh, threshold=threshold, seed=seed)
         with progress("Recording, modeling, simplifying", len(TEXTURES)) as advance:
-            made = list(reported(mapped(record, TEXTURES), advance, _texture))
+            recorded, benches = mapped(record, TEXTURES), Benches.begun(mapped)
+            made = list(reported(recorded, advance, _texture))
         # Other processes check the models while this one presents them.
-        checked, benches = mapped(with_checks, made), Benches.begun(mapped, made)
+        checked, scenes = mapped(with_checks, made), begun_scenes(mapped, made)
         render_set(demo_recipe(fresh, seed=seed), fresh / "stimuli")
         models = ModelSets(
             sets={
@@ -87,7 +91,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
         write_demo_report(
             fresh,
             results,
-            benches=benches.sections(rivals),
+            benches=benches.sections(scenes, rivals, mapped=mapped),
             provenance=provenance,
             planted=population.planted,
             seed=seed,
