@@ -173,20 +173,44 @@ def write_report(
         raise InputError(
             "expected answers or models to report on, got neither; run a session or fit a model."
         )
+    _write_pages(
+        target,
+        sections,
+        drawing,
+        title=title,
+        banner=_banner(responses, textures),
+        real=_real(responses, textures),
+        facts={**(provenance or {}), "seed of this report": seed},
+        progress=report_progress,
+    )
+    report_progress(1.0, "done")
+    return target
+
+
+def _write_pages(
+    target: Path,
+    sections: Sequence[Section],
+    drawing: _Drawing,
+    *,
+    title: str,
+    banner: str,
+    real: Sequence[str],
+    facts: Mapping[str, object],
+    progress: Progress,
+) -> None:
+    """The report and its supplement, once all pictures are drawn; tables and figures beside."""
     files = _Files(target.parent)
     for share, picture, (formats, lacking) in drawing.drawn():
-        report_progress(1 - PICTURES_SHARE * (1 - share), f"drawing {picture.title}")
+        progress(1 - PICTURES_SHARE * (1 - share), f"drawing {picture.title}")
         files.add_picture(picture, formats, lacking=lacking)
-    facts = {**(provenance or {}), "seed of this report": seed}
     undrawn = missing_fonts("".join(sorted(files.lacking)))
     headline = next((s.headline for s in sections if s.headline), Headline(""))
-    banner = _banner(responses, textures)
     chapters = [_Chapter.of(section, files) for section in sections if section.items]
     chapters.append(_origin(sections, facts, files=files, undrawn=undrawn))
     overview = (
         "overview",
         "At a glance",
-        _overview(sections, files, real=_real(responses, textures)),
+        _overview(sections, files, real=real),
     )
     html = page(
         title=title,
@@ -207,9 +231,7 @@ def write_report(
     write_text(target, html)
     write_text(target.with_name(SUPPLEMENT_NAME), behind)
     if undrawn:
-        warnings.warn(undrawn, stacklevel=2)
-    report_progress(1.0, "done")
-    return target
+        warnings.warn(undrawn, stacklevel=3)
 
 
 def _sections_of(name: str) -> object:
