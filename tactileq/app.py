@@ -30,6 +30,7 @@ COMMANDS = {
     "session": "session",
     "threshold": "threshold",
     "simulate": "simulate",
+    "verify": "verify",
     "analyze": "analyze",
     "demo": "demo",
     "import": "imports",

@@ -79,6 +79,10 @@ class Responses:
         Participants who will not return and are replaced by others.
     setups : int
         Number of set-ups that ran the study, each as planned, with the planned numbers in total.
+    verified : tuple of str
+        A line for each set-up: how many of its sessions are as they were stored.
+    unverified : str
+        Why answers are analyzed that are not; empty where they are.
     warnings : tuple of str
         What was dropped on reading and why, and which sessions ended early; one sentence each.
     """
@@ -98,6 +102,8 @@ class Responses:
     under_way: Mapping[str, frozenset[str]] = field(default_factory=dict)
     dropped_out: frozenset[str] = frozenset()
     setups: int = 1
+    verified: tuple[str, ...] = ()
+    unverified: str = ""
     warnings: tuple[str, ...] = field(default=())
 
     def identical(self, pair: tuple[str, str] = MODELS) -> frozenset[str]:

@@ -64,6 +64,8 @@ def pool_setups(setups: Mapping[str, Responses]) -> Responses:
         dropped_out=_named({name: one.dropped_out for name, one in setups.items()}),
         setups=len(setups),
         plan=replace(first.plan, sha256=tuple(hashes)),
+        verified=tuple(f"{name}: {line}" for name, one in setups.items() for line in one.verified),
+        unverified=next((one.unverified for one in setups.values() if one.unverified), ""),
         warnings=tuple(
             f"{name}: {warning}" for name, one in setups.items() for warning in one.warnings
         ),

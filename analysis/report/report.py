@@ -179,7 +179,7 @@ def write_report(
         drawing,
         title=title,
         banner=_banner(responses, textures),
-        real=_real(responses, textures),
+        verified=_verified(responses, textures),
         facts={**(provenance or {}), "seed of this report": seed},
         progress=report_progress,
     )
@@ -194,7 +194,7 @@ def _write_pages(
     *,
     title: str,
     banner: str,
-    real: Sequence[str],
+    verified: Sequence[str],
     facts: Mapping[str, object],
     progress: Progress,
 ) -> None:
@@ -210,7 +210,7 @@ def _write_pages(
     overview = (
         "overview",
         "At a glance",
-        _overview(sections, files, real=real),
+        _overview(sections, files, verified=verified),
     )
     html = page(
         title=title,
@@ -324,12 +324,11 @@ def _with_identical(responses: Responses, textures: Sequence[TextureResult]) -> 
     return replace(responses, equal=equal)
 
 
-def _overview(sections: Sequence[Section], files: _Files, *, real: Sequence[str]) -> str:
+def _overview(sections: Sequence[Section], files: _Files, *, verified: Sequence[str]) -> str:
     """The first page below its answer: who, pictures, and what bears on the answer."""
     # An unfinished task is reported in its own section and in the one on the verdicts.
     tiles_once = list(dict.fromkeys(tile for section in sections for tile in section.tiles))
-    verified = [sentence for section in sections for sentence in section.verified]
-    verified += [f"Real: {', '.join(real)}."] * bool(real)
+    of_chapters = [sentence for section in sections for sentence in section.verified]
     warned = [sentence for section in sections for sentence in section.cautions]
     caution = f'<div class="caution"><h3>What must not be concluded</h3>{bullets(warned)}</div>'
     below = {
@@ -337,7 +336,7 @@ def _overview(sections: Sequence[Section], files: _Files, *, real: Sequence[str]
             sentence for section in sections for sentence in section.deviations
         ],
         "Reliability": [sentence for section in sections for sentence in section.reliability],
-        "What was verified": verified,
+        "What was verified": [*of_chapters, *verified],
     }
     columns = "".join(
         f"<div><h3>{heading}</h3>{bullets(sentences)}</div>"
@@ -349,6 +348,13 @@ def _overview(sections: Sequence[Section], files: _Files, *, real: Sequence[str]
         + files.html([picture for section in sections for picture in section.front])
         + f'<div class="front">{columns}{caution * bool(warned)}</div>'
     )
+
+
+def _verified(responses: Responses | None, textures: Sequence[TextureResult]) -> list[str]:
+    """How far the answers are as they were stored, and what is not simulated."""
+    lines = [] if responses is None else [f"{line}." for line in responses.verified]
+    real = _real(responses, textures)
+    return lines + [f"Real: {', '.join(real)}."] * bool(real)
 
 
 def _real(responses: Responses | None, textures: Sequence[TextureResult]) -> list[str]:
@@ -370,7 +376,12 @@ def _banner(responses: Responses | None, textures: Sequence[TextureResult]) -> s
         reasons.append("no person took part")
     elif responses is not None and responses.simulated_rig:
         reasons.append("people took part, but with a simulated rig, so nobody felt a real surface")
-    return f"SIMULATED: {'; '.join(reasons)}." if reasons else ""
+    banner = [f"SIMULATED: {'; '.join(reasons)}."] if reasons else []
+    if responses is not None and responses.unverified:
+        banner.append(
+            f"NOT VERIFIED: answers differ from what sessions stored ({responses.unverified})."
+        )
+    return " ".join(banner)
 
 
 def _pictures(items: Sequence[Item]) -> list[Picture]:

@@ -5,20 +5,21 @@ All of it can be made again at any time, with the same bytes (docs/method/protoc
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from experiments.sessions.bids_people import people_files, readme
+from experiments.sessions.bids_people import people_files, people_there, readme
 from experiments.sessions.bids_session import Made, session_files
 from experiments.sessions.bids_tables import json_bytes
 from experiments.sessions.data_set import DESCRIPTION_NAME, describe_data_set
-from experiments.sessions.files import SessionFiles
+from experiments.sessions.files import SessionFiles, sessions_in
 from experiments.sessions.roster import Roster
 from experiments.sessions.stored_sessions import (
     Damaged,
     StoredSession,
+    held_of,
     held_session,
     held_sessions,
     participants_of,
@@ -75,8 +76,7 @@ def export_session(data_folder: str | Path, manifest_path: str | Path) -> None:
     if own.state.events:  # killed before its first event, it has nothing to show
         _write(session_files(own)[0])
     root = Path(data_folder)
-    held, damaged = held_sessions(root)
-    _write(_people(root, held, damaged=damaged))
+    _write(_people_after(root, own))
     with suppress(InputError):  # the next session is refused for it
         _write(_readme(root))
 
@@ -153,10 +153,8 @@ def require_tables(
             raise InputError(f"{one.sentence.removesuffix('.')}, or {advice}.")
     ended = (one for one in held if _to_be_shown(one) and read(one.files))
     wrong = [path for one in ended for path in _differing(session_files(one)[0])]
-    if task is None and subject is None and any(one.files.answers.is_file() for one in held):
-        # Of who has a session running they are those of before.
-        kept = {*without, *participants_of(one for one in held if one.running)}
-        wrong += _differing(_people(root, held, damaged=damaged, kept=kept))
+    if task is None and subject is None:
+        wrong += _differing_people(root, held, damaged, without=without)
     if wrong:
         others = len(wrong) - 1
         more = f" (and {counted(others, 'more file')})" if others else ""
@@ -168,15 +166,46 @@ def require_tables(
         )
 
 
+def differing_tables(
+    root: Path, held: Sequence[StoredSession], damaged: Sequence[Damaged]
+) -> list[Path]:
+    """Every file that is not there, or is not what all sessions that have ended give, made anew."""
+    made = (session_files(one, anew=True)[0] for one in held if _to_be_shown(one))
+    wrong = [path for of_one in made for path in _differing(of_one)]
+    wrong += _differing_people(root, held, damaged)
+    with suppress(InputError):  # a description that cannot be read is a finding of its own
+        wrong += _differing(_readme(root))
+    return wrong
+
+
+def _differing_people(
+    root: Path,
+    held: Sequence[StoredSession],
+    damaged: Sequence[Damaged],
+    without: Collection[str] = (),
+) -> list[Path]:
+    if not any(one.files.answers.is_file() for one in held):
+        return []
+    # Of who has a session running they are those of before.
+    kept = {*without, *participants_of(one for one in held if one.running)}
+    return _differing(_people(root, list(held), damaged=list(damaged), kept=kept))
+
+
 def _to_be_shown(held: StoredSession) -> bool:
     """Whether a session has ended, and had begun."""
     return bool(held.state.events) and not held.running
 
 
 def _people(
-    root: Path, held: list[StoredSession], *, damaged: list[Damaged], kept: Collection[str] = ()
+    root: Path,
+    held: list[StoredSession],
+    *,
+    damaged: list[Damaged],
+    kept: Collection[str] = (),
+    others: Collection[str] = (),
 ) -> Made:
-    """The tables about people of all sessions that are shown; `kept` are people left alone.
+    """The tables about people of all sessions that are shown; `kept` are people left alone, and
+    `others` people whose sessions are not among these.
 
     Nothing of a data set that also holds people without source data, as one that was published.
     """
@@ -187,18 +216,36 @@ def _people(
     lost = participants_of(damaged)
     known = participants_of(visible) | lost
     there = {path.parts[-4] for path in _answer_tables(root)}
-    if not there <= known:
+    if not there <= known.union(others):
         return {}
     roster = Roster(root).listed()
     kept = {*lost, *_without_source(root, [*held, *damaged]), *kept}
-    made = people_files(
-        root, visible, roster.entries, rows_kept=there if roster.damaged else kept, kept=kept
-    )
+    rows_kept = {*(there if roster.damaged else kept), *others}
+    made = people_files(root, visible, roster.entries, rows_kept=rows_kept, kept=kept)
     description = root / DESCRIPTION_NAME
     if visible and not description.is_file():
         first = min(visible, key=lambda one: one.state.begun_utc)
         made[description] = json_bytes(describe_data_set(first.manifest))
     return made
+
+
+def _people_after(root: Path, own: StoredSession) -> Made:
+    """The tables about people after a session, of which only those of its participant change.
+
+    The others' rows stay as they are, so that this takes no longer the more sessions there are;
+    all are made where somebody has none yet, or columns change.
+    """
+    table, name = root / "participants.tsv", own.files.participant
+    everybody = sessions_in(root)
+    shown = {files.participant for files in everybody if files.answers.is_file()}
+    others = shown - {name}
+    if others and (root / DESCRIPTION_NAME).is_file() and others <= people_there(table):
+        held, damaged = held_of(files for files in everybody if files.participant == name)
+        made = _people(root, held, damaged=damaged, others=others)
+        if table in made:
+            return made
+    held, damaged = held_sessions(root)
+    return _people(root, held, damaged=damaged)
 
 
 def _without_source(root: Path, sessions: Iterable[StoredSession | Damaged]) -> set[str]:

@@ -36,6 +36,7 @@ _MEANINGS = {
     "fault": "The rig or a part of it failed",
     "pen": "Acceleration at the pen was stored",
     "ended": "This start of the session ended",
+    "stored": "The files beside the log were closed",
 }
 _OWN = (
     Column(
@@ -114,7 +115,7 @@ _FROM_PRESENTATIONS = without(
 )
 EVENT_COLUMNS = (*_OWN, *_FROM_PRESENTATIONS)
 # Answers are in their own tables, the participants' in participants.tsv.
-_ELSEWHERE = ("answers", "row", "manifest_sha256", "overrides", "changed", "cut")
+_ELSEWHERE = ("answers", "row", "manifest_sha256", "overrides", "changed", "cut", "files")
 
 
 def event_rows(

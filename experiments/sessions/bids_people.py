@@ -91,6 +91,11 @@ def people_files(
     return files
 
 
+def people_there(table: Path) -> set[str]:
+    """Who has a row in a table of people, as sub-01."""
+    return set(_rows_there(table)[1])
+
+
 def _rows_there(table: Path) -> tuple[bytes, dict[str, bytes]]:
     """The header of a table of people, and its rows by participant; nothing where there is none."""
     if not table.is_file():

@@ -28,19 +28,20 @@ from modeling.files.hashes import sha256_of_paths
 Made = dict[Path, bytes]
 
 
-def session_files(held: StoredSession) -> tuple[Made, tuple[str, ...]]:
+def session_files(held: StoredSession, *, anew: bool = False) -> tuple[Made, tuple[str, ...]]:
     """All files of a session, and which rows of its traces are damaged and not in them.
 
     The last file is the sidecar that says that the others are there, and what is not in them. The
-    hand at a regular rate takes longest to make: it is taken as it is there where the sidecar says
-    that it was made from the same files.
+    hand at a regular rate takes longest to make: unless all is to be made anew, it is taken as it
+    is there where the sidecar says that it was made from the same files.
     """
     files = held.files
     runs = {event["run"] for event in held.state.events}
     sources = _sources(files)
     sidecar = files.answers.with_suffix(".json")
     shown, lost_rows = presentation_rows(files.named("presentations.tsv"), runs=runs)
-    hand, lost_readings = _hand_there(sidecar, sources) or _hand(held, runs)
+    there = None if anew else _hand_there(sidecar, sources)
+    hand, lost_readings = there or _hand(held, runs)
     made = {**_answers(held), **_events(held, shown), **hand}
     lost = {"presentations": lost_rows, "hand": lost_readings}
     damaged = {name: list(said) for name, said in lost.items() if said}

@@ -1,12 +1,14 @@
-"""The log of a session: one JSON object in each line, only ever appended.
+"""The log of a session: one JSON object in each line, only ever appended, each with its seal.
 
-docs/method/protocols.md#storing
+docs/method/protocols.md#storing and docs/method/verification.md#seals
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -21,9 +23,11 @@ from modeling.errors import shown
 from modeling.files.reading import read_bytes
 
 Event = dict[str, Any]
-OWN_FIELDS = ("n", "utc", "t_s", "run", "event")
+OWN_FIELDS = ("n", "utc", "t_s", "run", "event", "seal")
 SESSION_ENDS = ("complete", "aborted", "crashed")
 _LONGEST_S = 1e9  # of a run: 30 years
+_SEAL = b', "seal": "%s"}'
+_LINE_AND_MORE = re.compile(rb', "seal": "[0-9a-f]{16}"}.', re.DOTALL)
 _YEARS = range(2000, 2200)  # in which every time zone has a date for a moment
 
 
@@ -43,6 +47,11 @@ class Log:
     events: tuple[Event, ...]
     cut: bytes = b""
 
+    @property
+    def seal(self) -> str:
+        """That of its last line; empty where there is none, or an earlier version began it."""
+        return str(self.events[-1].get("seal", "")) if self.events else ""
+
 
 def read_log(path: str | Path) -> Log:
     """The events of a session's log.
@@ -51,11 +60,14 @@ def read_log(path: str | Path) -> Log:
     ------
     InputError
         If the file cannot be read, or a whole line is not an event with the line's number, of a
-        start of the session that an "opened" began, with fields as sessions write them.
+        start of the session that an "opened" began, with fields as sessions write them; or, in a
+        log whose first line has a seal, without the one over it and all lines before.
     """
     *lines, cut = read_bytes(Path(path), "the log of a session").split(b"\n")
     events: list[Event] = []
-    runs = 0
+    runs, seal = 0, ""
+    if _LINE_AND_MORE.search(cut):  # a damaged end of a line: what was cut short has no such end
+        raise _malformed(Path(path), len(lines) + 1, shown(cut.decode("utf-8", "replace")))
     for number, line in enumerate(lines, start=1):
         try:
             event = object_of(line)
@@ -69,6 +81,14 @@ def read_log(path: str | Path) -> Log:
             if not holds(value) or value != wanted.get(name, value):
                 got = f"{name} = {shown(value)}" if name in event else f"no {name}"
                 raise _malformed(Path(path), number, got)
+        if "seal" in (events[0] if events else event):
+            seal = seal_after(seal, line.removesuffix(_SEAL % str(event.get("seal")).encode()))
+        if event.get("seal", "") != seal:
+            raise InputError(
+                f"expected the seal {seal or 'of a first line'} over line {number} of {path} and "
+                f"all before it, got {shown(event.get('seal', 'none'))}: one of these lines was "
+                "changed; restore the file from a copy."
+            )
         events.append(event)
     return Log(tuple(events), cut)
 
@@ -162,6 +182,20 @@ def line_of(values: Mapping[str, Any]) -> bytes:
         text = json.dumps(plain(values), ensure_ascii=False)
     # Half of a surrogate pair (of a file name, say) becomes the escape that JSON has for it.
     return text.encode("utf-8", "backslashreplace") + b"\n"
+
+
+def sealed_line(values: Mapping[str, Any], before: str) -> tuple[bytes, str]:
+    """Values as a line with its seal at the end, and that seal; `before` is the one of the line
+    before, empty for the first.
+    """
+    line = line_of(values).removesuffix(b"}\n")
+    seal = seal_after(before, line)
+    return line + _SEAL % seal.encode() + b"\n", seal
+
+
+def seal_after(before: str, line: bytes) -> str:
+    """The seal of a line: 16 hexadecimal digits over the one before and the line's own bytes."""
+    return hashlib.sha256(before.encode() + line).hexdigest()[:16]
 
 
 def plain(value: object) -> Any:

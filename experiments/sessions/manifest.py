@@ -37,6 +37,7 @@ class SessionManifest(DescribedJson):
     WHAT = "the manifest of a session"
     FORMAT = "tactileq.session-manifest"
     ADVICE = "restore the file from a copy"
+    OPTIONAL = frozenset({"after"})
 
     task: Annotated[str, key("as in the study file")]
     subject: Annotated[_FromOne, key("number of the participant")]
@@ -69,6 +70,13 @@ class SessionManifest(DescribedJson):
         tuple[Mapping[str, str], ...],
         key("what was allowed against a rule (`what`), and the `reason`"),
     ] = ()
+    after: Annotated[
+        Mapping[str, str] | None,
+        key(
+            "the session that ended last before this one, by its `session`, and the `seal` of its "
+            "log; empty before the first, missing of earlier versions, whose logs have no seals"
+        ),
+    ] = None
     versions: Annotated[Mapping[str, str], key("of Python and of the packages that are installed")]
     platform: Annotated[str, key("of the machine")]
     git_revision: Annotated[str, key("the commit; empty where it is not known")]

@@ -40,10 +40,26 @@ class Listed:
     damaged : str
         What cannot be read, in words; empty where all can be. Then nobody new is enrolled: whose
         number and slot stood there is not known.
+    seals : tuple of LastSeal
+        In the order in which sessions ended.
     """
 
     entries: dict[int, dict[str, Any]]
     damaged: str = ""
+    seals: tuple[LastSeal, ...] = ()
+
+
+@dataclass(frozen=True)
+class LastSeal:
+    """A session that ended, as sub-01_ses-01_task-absolute, and the seal of its log's last line."""
+
+    session: str
+    seal: str
+
+    @property
+    def to_write_down(self) -> str:
+        """What an experimenter copies by hand: its last 8 characters."""
+        return self.seal[-8:]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,12 +76,15 @@ class RosterEntry:
         Pseudonym, such as TAKI-46.
     known : bool
         Whether this person was enrolled before.
+    after : LastSeal, optional
+        Of the session of the data set that ended last; None before the first.
     """
 
     subject: int
     slot: int
     code: str
     known: bool
+    after: LastSeal | None = None
 
 
 class Roster:
@@ -121,7 +140,7 @@ class Roster:
             number = subject if subject is not None else _first_free(entries)
             if number in entries:
                 _require_own_slot(number, entries, path=self.path)
-                yield self._returning(entries[number], participants, simulated=simulated)
+                yield self._returning(listed, number, participants, simulated=simulated)
                 return
             self._require_whole(listed)
             slot = _slot(number, participants, entries)
@@ -130,10 +149,23 @@ class Roster:
             before = self.path.stat().st_size if self.path.exists() else 0
             self._append("enrolled", subject=number, slot=slot, code=code, **kind)
             try:
-                yield RosterEntry(subject=number, slot=slot, code=code, known=False)
+                yield RosterEntry(
+                    subject=number, slot=slot, code=code, known=False, after=_last(listed)
+                )
             except BaseException:
                 os.truncate(self.path, before)
                 raise
+
+    def note_seal(self, sealed: LastSeal) -> None:
+        """Note the seal with which a session ended.
+
+        Raises
+        ------
+        StoreError
+            If the disk does not take it.
+        """
+        with self._locked():
+            self._append("sealed", session=sealed.session, seal=sealed.seal)
 
     def drop(self, subject: int) -> None:
         """Note that a participant will not come again, so that another one gets the slot.
@@ -190,19 +222,20 @@ class Roster:
     def listed(self) -> Listed:
         """What can be read of it, line by line; raises as `subjects`."""
         entries: dict[int, dict[str, Any]] = {}
+        seals: list[LastSeal] = []
         damaged = []
         if os.path.lexists(self.path):
             *lines, _ = read_bytes(self.path, "the roster").split(b"\n")
             for number, line in enumerate(lines, start=1):
                 try:
-                    _enter(object_of(line), entries)
+                    _enter(object_of(line), entries, seals)
                 except (KeyError, TypeError, ValueError):
                     damaged.append(f"line {number} of {self.path}")
         # A list that was cut short between two lines misses somebody who was here.
         here = {files.subject: files.participant for files in sessions_in(self._root)}
         missing = [name for subject, name in here.items() if subject not in entries]
         damaged += [f"no line of {name} in {self.path}" for name in missing]
-        return Listed(entries=entries, damaged=damaged[0] if damaged else "")
+        return Listed(entries=entries, damaged=damaged[0] if damaged else "", seals=tuple(seals))
 
     @contextmanager
     def _locked(self) -> Iterator[Listed]:
@@ -218,9 +251,10 @@ class Roster:
             raise store_error(error, self.path, _ADVICE) from error
 
     def _returning(
-        self, entry: Mapping[str, Any], participants: int, *, simulated: bool
+        self, listed: Listed, number: int, participants: int, *, simulated: bool
     ) -> RosterEntry:
-        number, slot = entry["subject"], entry["slot"]
+        entry = listed.entries[number]
+        slot = entry["slot"]
         if entry["left"]:
             raise InputError(
                 f"expected somebody who takes part, got subject {number}, who "
@@ -237,7 +271,9 @@ class Roster:
                 f"expected one of the {participants} slots of the task, got subject {number} with "
                 f"slot {slot}; choose a subject with a lower slot, or plan more participants."
             )
-        return RosterEntry(subject=number, slot=slot, code=entry["code"], known=True)
+        return RosterEntry(
+            subject=number, slot=slot, code=entry["code"], known=True, after=_last(listed)
+        )
 
     def _require_whole(self, listed: Listed) -> None:
         if listed.damaged:
@@ -290,8 +326,20 @@ def _without_code(line: bytes, subject: int) -> bytes:
     return line_of({**event, "code": ""}) if enrolment else line
 
 
-def _enter(event: Mapping[str, Any], entries: dict[int, dict[str, Any]]) -> None:
-    """Note who enrolled or left; KeyError, TypeError or ValueError for what says neither."""
+def _last(listed: Listed) -> LastSeal | None:
+    return listed.seals[-1] if listed.seals else None
+
+
+def _enter(
+    event: Mapping[str, Any], entries: dict[int, dict[str, Any]], seals: list[LastSeal]
+) -> None:
+    """Note who enrolled or left, or what ended; KeyError, TypeError or ValueError for all else."""
+    if event["event"] == "sealed":
+        sealed = LastSeal(event["session"], event["seal"])
+        if not (isinstance(sealed.session, str) and isinstance(sealed.seal, str)):
+            raise TypeError(sealed)
+        seals.append(sealed)
+        return
     subject, what = event["subject"], event["event"]
     if what != "enrolled":
         entries[subject]["left"] = {"dropped": "dropped", "withdrawn": "withdrawn"}[what]

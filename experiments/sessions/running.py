@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +16,13 @@ from experiments.sessions.overrides import Overrides
 from experiments.sessions.people import Intake
 from experiments.sessions.program import program_facts
 from experiments.sessions.resume import resumption
-from experiments.sessions.roster import Roster, RosterEntry
+from experiments.sessions.roster import LastSeal, Roster, RosterEntry
 from experiments.sessions.session_store import SessionStore
 from experiments.sessions.stored_sessions import held_session
 from experiments.sessions.task import Task
 from experiments.sessions.trial_loop import People, SessionResult, run_trials
-from experiments.study.design import SessionPlan, Trial
+from experiments.sessions.writer import StoreError
+from experiments.study.design import SessionPlan
 from experiments.study.models import ModelSets
 from experiments.study.study import Study, plan_sha256
 from modeling import InputError
@@ -132,6 +134,7 @@ def run_session(
                 session=session,
                 slot=person.slot,
                 code=person.code,
+                after={} if person.after is None else asdict(person.after),
                 trials=tuple(trial.to_dict() for trial in plan.trials),
             )
             files = manifest.files(root)
@@ -139,7 +142,7 @@ def run_session(
                 held_session(files)  # nothing goes on that cannot be read to its end
             opened = SessionStore.resume if said.resume else SessionStore.create
             store = opened(root, manifest, overrides=overrides)
-        with store:
+        with _sealed(store, root):
             stored = _stored_plan(plan, task, store=store, models=models)
             result = run_trials(
                 stored,
@@ -155,6 +158,22 @@ def run_session(
     finally:
         rig.close()
     return result, store.files.manifest
+
+
+@contextmanager
+def _sealed(store: SessionStore, root: Path) -> Iterator[None]:
+    """Close a session at the end, and note in the roster the seal that it ends with.
+
+    Where the disk takes no more, the log is what counts: the next manifest names the last seal
+    that was noted.
+    """
+    try:
+        with store:
+            yield
+    finally:
+        with suppress(StoreError, InputError):
+            if store.seal:
+                Roster(root).note_seal(LastSeal(store.files.stem, store.seal))
 
 
 def _stated(
@@ -227,28 +246,14 @@ def _stored_plan(
     study = Study.from_dict(store.manifest.study)
     if study.sha256 != plan.study.sha256:
         models.require(study, allow=lambda what, sentence: None)
-    trials = tuple(_trial(task, values) for values in store.manifest.trials)
+    trials = tuple(task.trial_of(values) for values in store.manifest.trials)
     return replace(plan, study=study, trials=trials)
 
 
 def _agenda(task: Task, store: SessionStore) -> Agenda:
     """What is to be done of the trials that the manifest on disk plans."""
-    trials = [_trial(task, values) for values in store.manifest.trials]
+    trials = [task.trial_of(values) for values in store.manifest.trials]
     if not store.before.runs:
         return Agenda.whole(trials)
     gap_min = store.manifest.study["longest_gap_min"]
     return Agenda.left(trials, resumption(store.manifest, store.before, longest_gap_min=gap_min))
-
-
-def _trial(task: Task, values: Mapping[str, Any]) -> Trial:
-    """A trial as it was before it was stored: what is a list in JSON was a tuple."""
-    stored: dict[str, Any] = {
-        name: tuple(value) if isinstance(value, list) else value for name, value in values.items()
-    }
-    try:
-        return task.trial(**stored)
-    except TypeError:
-        raise InputError(
-            f"expected a trial of the task {task.name} in the manifest, got {shown(stored)}; "
-            "restore the file from a copy."
-        ) from None

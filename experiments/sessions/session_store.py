@@ -40,6 +40,7 @@ from modeling import InputError
 from modeling.errors import shown
 from modeling.files.columns import Column, sidecar
 from modeling.files.documents import dump_json
+from modeling.files.hashes import sha256_of_paths
 from modeling.files.locks import HeldError, Lock
 from modeling.files.places import locked
 from modeling.files.syncing import make_folder, sync_folder
@@ -63,6 +64,8 @@ class SessionStore:
         How the session stood before this run.
     run : int
         From 1: how often the session was begun or taken up again, this run included.
+    seal : str
+        Of the last line of the log that is on disk; empty where an earlier version began it.
     """
 
     def __init__(
@@ -71,6 +74,7 @@ class SessionStore:
         self.files, self.manifest, self._lock = files, manifest, lock
         self._began_s = time.monotonic()
         self._tables: list[GrowingTable] = []
+        self._opened = False
         try:
             log = read_log(files.log)
             self.before = state_of(log, running=False)
@@ -84,7 +88,8 @@ class SessionStore:
             os.close(handle)
             raise
         self.run = self.before.runs + 1
-        self._writer = LogWriter(handle, files.log, first=len(log.events) + 1)
+        seal = None if log.events and not log.seal else log.seal
+        self._writer = LogWriter(handle, files.log, first=len(log.events) + 1, seal=seal)
 
     @classmethod
     def create(
@@ -206,6 +211,12 @@ class SessionStore:
             with suppress(StoreError):
                 self.close()
             raise
+        self._opened = True
+
+    @property
+    def seal(self) -> str:
+        """See the class."""
+        return self._writer.seal or ""
 
     def log(self, event: str, **fields: object) -> None:
         """See `Store.log`."""
@@ -260,16 +271,28 @@ class SessionStore:
     def close(self) -> None:
         """Write what is queued, close the files, and let others run the session.
 
+        The last line of the log holds the SHA-256 of what lies beside it.
+
         Raises
         ------
         StoreError
             If something queued could not be written.
         """
         self._close_tables()
+        opened, self._opened = self._opened, False
         try:
-            self._writer.close()
+            if opened:
+                self.log("stored", files=self._beside_the_log())
         finally:
-            self._lock.release()
+            try:
+                self._writer.close()
+            finally:
+                self._lock.release()
+
+    def _beside_the_log(self) -> dict[str, str]:
+        """SHA-256 of the session's other files by their names, as far as they can be read."""
+        paths = (path for path in self.files.there() if path != self.files.log)
+        return {Path(path).name: found for path, found in sha256_of_paths(paths).items()}
 
     def _table(self, name: str, columns: Sequence[Column]) -> GrowingTable:
         described = dump_json(sidecar(columns))

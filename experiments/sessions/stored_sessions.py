@@ -60,14 +60,20 @@ def held_session(files: SessionFiles) -> StoredSession:
     _check_logged(state.events, files)
     stored = read_bytes(files.manifest, "the manifest of a session")
     check_named(state.events, files, sha256=hashlib.sha256(stored).hexdigest())
+    _check_sealed(manifest, state.events, files)
     _check_rows(state.events, files)
     return StoredSession(files=files, manifest=manifest, state=state)
 
 
 def held_sessions(data_folder: str | Path) -> tuple[list[StoredSession], list[Damaged]]:
     """All sessions of a data set that have a manifest, by subject, session and task."""
+    return held_of(sessions_in(data_folder))
+
+
+def held_of(sessions: Iterable[SessionFiles]) -> tuple[list[StoredSession], list[Damaged]]:
+    """These sessions, in their order."""
     held, damaged = [], []
-    for files in sessions_in(data_folder):
+    for files in sessions:
         try:
             held.append(held_session(files))
         except InputError as error:
@@ -95,6 +101,15 @@ def check_named(events: Sequence[Event], files: SessionFiles, *, sha256: str) ->
         raise InputError(
             f"expected the manifest {named[:8]}… that {files.log} names, got {sha256[:8]}… in "
             f"{files.manifest}; restore that file from a copy."
+        )
+
+
+def _check_sealed(manifest: SessionManifest, events: Sequence[Event], files: SessionFiles) -> None:
+    """Refuse a log without seals where the program that began it wrote some."""
+    if manifest.after is not None and events and "seal" not in events[0]:
+        raise InputError(
+            f"expected a log with seals, as that of every session whose manifest names the one "
+            f"before, got none in {files.log}; restore that file from a copy."
         )
 
 

@@ -10,6 +10,8 @@ from experiments.sessions.people import Respondent
 from experiments.sessions.surfaces import Surfaces
 from experiments.study.design import Occasion, Order, Trial
 from experiments.study.models import ModelSets
+from modeling import InputError
+from modeling.errors import shown
 from modeling.files.answer_tables import ANSWER_TABLES, AnswerColumn
 from rig.interface import Presentable, TextureRig, ToneBurst
 
@@ -58,6 +60,26 @@ class Task:
     adapt: Callable[[Any, Sequence[Mapping[str, object]], TextureRig], Any] | None = None
     mounts: bool = True
     feel_all: bool = False
+
+    def trial_of(self, values: Mapping[str, Any]) -> Trial:
+        """A trial as it was before a manifest stored it: what is a list in JSON was a tuple.
+
+        Raises
+        ------
+        InputError
+            If these are not the values of a trial of the task.
+        """
+        stored: dict[str, Any] = {
+            name: tuple(value) if isinstance(value, list) else value
+            for name, value in values.items()
+        }
+        try:
+            return self.trial(**stored)
+        except TypeError:
+            raise InputError(
+                f"expected a trial of the task {self.name} in the manifest, got {shown(stored)}; "
+                "restore the file from a copy."
+            ) from None
 
     @property
     def columns(self) -> tuple[AnswerColumn, ...]:

@@ -11,7 +11,7 @@ from threading import Event as Signal
 from threading import Thread
 from typing import Any
 
-from experiments.sessions.log import line_of
+from experiments.sessions.log import line_of, sealed_line
 from modeling.files.reading import reason_of
 
 
@@ -51,10 +51,18 @@ class LogWriter:
         For messages.
     first : int
         The number of the next event.
+    seal : str, optional
+        Of the line before, empty for the first; None for a log that an earlier version began
+        without seals.
+
+    Attributes
+    ----------
+    seal : str or None
+        Of the last line on disk.
     """
 
-    def __init__(self, handle: int, path: Path, *, first: int) -> None:
-        self._handle, self._path, self._next = handle, path, first
+    def __init__(self, handle: int, path: Path, *, first: int, seal: str | None = "") -> None:
+        self._handle, self._path, self._next, self.seal = handle, path, first, seal
         # Its put may be interrupted by a signal whose handler puts something, too.
         self._queue: SimpleQueue[_Queued] = SimpleQueue()
         self._error: StoreError | None = None
@@ -128,11 +136,13 @@ class LogWriter:
         safe = 0
         try:
             if batch and self._error is None:
-                numbered = (
-                    {"n": n, **(event or {})} for n, (event, _) in enumerate(batch, self._next)
-                )
-                lines = [line_of(event) for event in numbered]
+                lines, seals = [], [self.seal]
+                for n, (event, _) in enumerate(batch, self._next):
+                    line, seal = self._sealed({"n": n, **(event or {})}, seals[-1])
+                    lines.append(line)
+                    seals.append(seal)
                 safe = self._append(lines)
+                self.seal = seals[safe]
         except Exception as error:  # whatever it is: who waits must not wait indefinitely
             self._error = self._error or StoreError(
                 f"expected to write to {self._path}, got {error!r}; report this as an error."
@@ -142,6 +152,9 @@ class LogWriter:
             if receipt:
                 receipt.error = self._error if place >= safe else None
                 receipt.given.set()
+
+    def _sealed(self, event: Mapping[str, Any], before: str | None) -> tuple[bytes, str | None]:
+        return (line_of(event), None) if before is None else sealed_line(event, before)
 
     def _append(self, lines: list[bytes]) -> int:
         """Write lines and force them to disk; how many are safe there. The rest is cut off."""

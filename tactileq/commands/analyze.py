@@ -76,13 +76,19 @@ def analyze(
     dask: Annotated[
         str | None, typer.Option(help="Address of a Dask scheduler whose workers run --validate.")
     ] = None,
+    unverified: Annotated[
+        str | None,
+        typer.Option(
+            metavar="REASON", help="Go on where data differ from what sessions stored, and say why."
+        ),
+    ] = None,
     seed: Seed = 0,
 ) -> None:
     """Test the answers and write report.html with its tables and figures.
 
-    DATA is only read. A table that is incomplete or differs from the log of its session is named;
-    tactileq study status writes it again. A damaged session is named, too; it has to be restored,
-    or its participant excluded.
+    DATA is only read, and verified first, as by tactileq verify. A table that is incomplete or
+    differs from the log of its session is named; tactileq study status writes it again. Whatever
+    else differs has to be restored, its participant excluded, or a reason given.
 
     The claims are those of the study that was run; those of --plan are exploratory. With
     --recordings, --models and --simplified the report also states the accuracy and size of the
@@ -100,7 +106,7 @@ def analyze(
     """
     folders = (recordings, models, simplified)
     if table is not None or columns is not None:
-        if (*folders, plan, exclude, validate) != (None,) * 6 or complete:
+        if (*folders, plan, exclude, validate, unverified) != (None,) * 7 or complete:
             raise ValueError(
                 "expected --table with no option but --map, --out and --seed, got more; "
                 "leave the others out."
@@ -124,7 +130,7 @@ def analyze(
     seen = check_own_results(out, "analyze")
     places = _places(data)
     inputs = sha256_of_paths(path for path in (*places.values(), *folders) if path is not None)
-    responses = read_answers(places, exclude or ())
+    responses = read_answers(places, exclude or (), unverified=unverified)
     if plan is not None:
         responses = replace(responses, plan=_later_plan(plan, responses.plan))
     if not complete:
@@ -213,31 +219,33 @@ def _places(data: Sequence[str]) -> dict[str, Path]:
     return places
 
 
-def read_answers(places: Mapping[str, Path], exclude: Sequence[str]) -> Responses:
+def read_answers(
+    places: Mapping[str, Path], exclude: Sequence[str], *, unverified: str | None = None
+) -> Responses:
     """The answers at all set-ups, without those who are left out; nothing is written.
 
     Raises
     ------
     InputError
-        If a session is damaged, or tables are not what its log says, of those who are not left
-        out, or the answers cannot be used.
+        If something of those who are not left out differs from what sessions stored, and there is
+        no reason to go on unverified; or the answers cannot be used.
     """
     from analysis.answers.loading import load_responses
     from analysis.answers.responses import SETUP_SEPARATOR, leave_out
     from analysis.answers.setups import pool_setups
-    from experiments.sessions.bids import require_tables
+    from tactileq.verification import require_verified
 
     reasons = dict(map(_with_reason, exclude))
     setups = {}
     for name, place in places.items():
         before = f"{name}{SETUP_SEPARATOR}" if name else ""
         without = {who.removeprefix(before) for who in reasons if who.startswith(before)}
-        require_tables(
-            place,
-            without=without,
-            otherwise=f"leave the participant out with --exclude {before}{{who}}=REASON",
+        found = require_verified(place, without=without, unverified=unverified, named=before)
+        setups[name] = replace(
+            load_responses(place, leaving_out=without),
+            verified=(found.summary,),
+            unverified=(unverified or "") if found.findings else "",
         )
-        setups[name] = load_responses(place, leaving_out=without)
     responses = pool_setups(setups) if len(setups) > 1 else next(iter(setups.values()))
     return leave_out(responses, reasons)
 

@@ -1,0 +1,407 @@
+"""Is everything in a data set as it was stored? Reads only.
+
+docs/method/verification.md
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from experiments.sessions.bids import differing_tables
+from experiments.sessions.data_set import DESCRIPTION_NAME, describe_data_set
+from experiments.sessions.files import SessionFiles, require_data_folder, sessions_in
+from experiments.sessions.log import plain
+from experiments.sessions.order import draw_session
+from experiments.sessions.roster import Roster
+from experiments.sessions.stored_sessions import Damaged, StoredSession, held_sessions
+from experiments.study.study import Study, plan_sha256
+from experiments.tasks import task_named
+from experiments.verification.copies import copied
+from experiments.verification.finding import Finding
+from experiments.verification.replaying import contradictions
+from experiments.verification.sidecars import check_sidecars
+from modeling import InputError
+from modeling.errors import counted, shown
+from modeling.files.documents import read_json_object
+from modeling.files.hashes import sha256_of_paths
+
+_OF_A_SESSION = re.compile(r"(sub-\d+)_ses-\d+_task-.*")
+# What a session may have otherwise than the description, for a recorded reason.
+_OVERRIDDEN = (("StudySHA256", "study"), ("ModelsSHA256", "models"), ("Pilot", "pilot"))
+# Of the description: what the first session fixes. The rest is for people to fill in.
+_FIXED = (
+    "Simulated",
+    "SimulatedParticipant",
+    "SimulatedRig",
+    "Pilot",
+    "StudySHA256",
+    "ModelsSHA256",
+    "StudyDesign",
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verified:
+    """What became of verifying a data set.
+
+    Parameters
+    ----------
+    findings : tuple of Finding
+        Empty where everything is as it was stored.
+    sessions : tuple of str
+        Those that have ended, as sub-01_ses-01_task-absolute.
+    running : tuple of str
+        Those that a console runs now, of which nothing is verified.
+    unsealed : tuple of str
+        Those whose log an earlier version wrote, without seals.
+    seal : str
+        8 hexadecimal digits over the seals of all logs.
+    with_source : bool
+        Whether there are logs; without, only hashes in sidecars could be compared.
+    """
+
+    findings: tuple[Finding, ...]
+    sessions: tuple[str, ...]
+    running: tuple[str, ...] = ()
+    unsealed: tuple[str, ...] = ()
+    seal: str = ""
+    with_source: bool = True
+
+    def without(self, participants: Collection[str]) -> Verified:
+        """Without what is about these participants (sub-01) alone."""
+        kept = tuple(f for f in self.findings if f.participant not in participants)
+        sessions = tuple(s for s in self.sessions if s.partition("_")[0] not in participants)
+        return replace(self, findings=kept, sessions=sessions)
+
+    @property
+    def summary(self) -> str:
+        """One line, as 68 of 68 sessions verified, seal 3fa9c1d2."""
+        wrong = {Path(finding.place).name for finding in self.findings}
+        sound = sum(not any(w.startswith(f"{s}_") for w in wrong) for s in self.sessions)
+        said = f"{sound} of {counted(len(self.sessions), 'session')} verified"
+        if not self.with_source:
+            said += " by the hashes in their sidecars (there is no source data)"
+        if self.seal:
+            said += f", seal {self.seal}"
+        if self.unsealed:
+            said += f", {len(self.unsealed)} without seals (of an earlier version)"
+        if self.running:
+            said += f", {len(self.running)} still running"
+        if self.findings:
+            said += f"; {counted(len(self.findings), 'difference')}"
+        return said
+
+
+def verify_data(data_folder: str | Path) -> Verified:
+    """Compare everything in a data set with what its sessions must have stored.
+
+    docs/method/verification.md says what is compared with what.
+
+    Parameters
+    ----------
+    data_folder : path
+        Root of the data set. Nothing is written.
+
+    Raises
+    ------
+    InputError
+        If there is no such folder, or it is not that of a study.
+    """
+    root = Path(data_folder)
+    require_data_folder(root)
+    if not sessions_in(root):
+        return _published(root)
+    held, damaged = held_sessions(root)
+    ended = [one for one in held if one.state.events and not one.running]
+    found = [
+        Finding(place=_in(root, one), sentence=one.sentence, participant=one.files.participant)
+        for one in damaged
+    ]
+    for one in ended:
+        found += _of_session(root, one)
+    found += _tables(root, held, damaged)
+    found += _strangers(root, held, damaged)
+    found += _people(root, held)
+    found += _description(root, held)
+    found += _chains(root, held, damaged)
+    found += [
+        Finding(place=_in(root, one), sentence=sentence, participant=one.files.participant)
+        for one, sentence in copied(ended)
+    ]
+    seals = {one.files.stem: _seal(one) for one in ended}
+    return Verified(
+        findings=tuple(found),
+        sessions=(*seals, *(one.files.stem for one in damaged)),
+        running=tuple(one.files.stem for one in held if one.running),
+        unsealed=tuple(stem for stem, seal in seals.items() if not seal),
+        seal=seal_of_study(seals),
+    )
+
+
+def seal_of_study(seals: Mapping[str, str]) -> str:
+    """8 hexadecimal digits over sessions and the seals of their logs; empty without seals."""
+    lines = "".join(f"{stem} {seal}\n" for stem, seal in sorted(seals.items()) if seal)
+    return hashlib.sha256(lines.encode()).hexdigest()[-8:] if lines else ""
+
+
+def _published(root: Path) -> Verified:
+    """Data without sessions' own files: only what sidecars state can be compared."""
+    findings, sessions = check_sidecars(root)
+    if not sessions:
+        raise InputError(
+            f"expected the data folder of a study, got {root}, in which there is no session; name "
+            "the one that holds sourcedata or sub-01."
+        )
+    return Verified(findings=findings, sessions=sessions, with_source=False)
+
+
+def _in(root: Path, one: StoredSession | Damaged) -> str:
+    return one.files.log.relative_to(root).as_posix()
+
+
+def _seal(one: StoredSession) -> str:
+    return str(one.state.events[-1].get("seal", ""))
+
+
+def _of_session(root: Path, one: StoredSession) -> Iterator[Finding]:
+    """Its order drawn again, its hashes, its log replayed, and the files beside it."""
+    who, log = one.files.participant, _in(root, one)
+    manifest = one.files.manifest.relative_to(root).as_posix()
+
+    def finding(place: str, sentence: str, trial: int | None = None) -> Finding:
+        return Finding(place=place, sentence=sentence, trial=trial, participant=who)
+
+    try:
+        study, task = Study.from_dict(one.manifest.study), task_named(one.manifest.task)
+        facts = one.manifest
+        plan = draw_session(
+            study, task, subject=facts.subject, session=facts.session, slot=facts.slot
+        )
+    except InputError as error:
+        yield finding(manifest, f"expected a study by which its order can be drawn, got {error}")
+        return
+    drawn = [plain(trial.to_dict()) for trial in plan.trials]
+    for wanted, got in zip(drawn, facts.trials, strict=False):
+        if wanted != got:
+            names = [n for n in {**wanted, **got} if wanted.get(n) != got.get(n)]
+            yield finding(
+                manifest,
+                f"expected {names[0]} {shown(wanted.get(names[0]))}, as study, seed and slot give "
+                f"it, got {shown(got.get(names[0]))}",
+                wanted["trial"],
+            )
+    if len(drawn) != len(facts.trials):
+        yield finding(manifest, f"expected {len(drawn)} trials, got {len(facts.trials)}")
+    if plan_sha256(study, facts.models_sha256) != facts.plan_sha256:
+        yield finding(manifest, "expected the plan_sha256 of this study and these models")
+    if _equal_sets(facts.models_sha256, study.models_of(facts.task)) != {
+        texture: {frozenset(group) for group in groups}
+        for texture, groups in facts.identical.items()
+    }:
+        yield finding(manifest, "expected under identical the sets whose models have one SHA-256")
+    for trial, sentence in contradictions(one, task):
+        yield finding(log, sentence, trial)
+    yield from _beside(root, one)
+
+
+def _equal_sets(
+    models: Mapping[str, Mapping[str, str]], names: Sequence[str]
+) -> dict[str, set[frozenset[str]]]:
+    """For each texture the groups of a task's sets whose models have the same SHA-256."""
+    found = {}
+    for texture, hashes in models.items():
+        by_hash: dict[str, set[str]] = {}
+        for name in names:
+            by_hash.setdefault(hashes.get(name, name), set()).add(name)
+        if groups := {frozenset(group) for group in by_hash.values() if len(group) > 1}:
+            found[texture] = groups
+    return found
+
+
+def _beside(root: Path, one: StoredSession) -> Iterator[Finding]:
+    """The files beside the log, whose hashes its last line holds unless it was killed."""
+    *_, last = one.state.events
+    if last["event"] != "stored":
+        return
+    stored: Mapping[str, str] = last.get("files", {})
+    there = [path for path in one.files.there() if path != one.files.log]
+    hashes = {Path(path).name: sha256 for path, sha256 in sha256_of_paths(there).items()}
+    for name in sorted({*stored, *hashes}):
+        if stored.get(name) != hashes.get(name):
+            got = "none" if name not in hashes else "another"
+            expected = "no such file" if name not in stored else "the file that its log names"
+            yield Finding(
+                place=(one.files.folder / name).relative_to(root).as_posix(),
+                sentence=f"expected {expected}, got {'one' if name not in stored else got}",
+                participant=one.files.participant,
+            )
+
+
+def _tables(
+    root: Path, held: Sequence[StoredSession], damaged: Sequence[Damaged]
+) -> Iterator[Finding]:
+    """Every table, made again from the log."""
+    for path in differing_tables(root, held, damaged):
+        got = "another" if path.exists() else "none"
+        place = path.relative_to(root).as_posix()
+        name = place.partition("/")[0]
+        yield Finding(
+            place=place,
+            sentence=f"expected the table that its log gives, got {got}",
+            participant=name if name.startswith("sub-") else "",
+        )
+
+
+def _strangers(
+    root: Path, held: Sequence[StoredSession], damaged: Sequence[Damaged]
+) -> Iterator[Finding]:
+    """Files under the name of a session that no session here made."""
+    every: list[StoredSession | Damaged] = [*held, *damaged]
+    known = {one.files.stem: one.files for one in every}
+    for folder in ("sourcedata/sub-*/ses-*", "sub-*/ses-*/beh"):
+        for path in sorted(root.glob(f"{folder}/sub-*")):
+            match = _OF_A_SESSION.fullmatch(path.name)
+            if match is None:
+                continue
+            stem = next((s for s in known if path.name.startswith(f"{s}_")), None)
+            place = path.relative_to(root).as_posix()
+            if stem is None or path.parent not in (known[stem].folder, known[stem].beh):
+                yield Finding(
+                    place=place,
+                    sentence="expected a file of a session that has a manifest, got one of none",
+                    participant=match[1],
+                )
+            elif path.parent == known[stem].beh and not _listed(path, known[stem]):
+                yield Finding(
+                    place=place,
+                    sentence="expected a file that its session's sidecar lists, got another",
+                    participant=match[1],
+                )
+
+
+def _listed(path: Path, files: SessionFiles) -> bool:
+    sidecar = files.answers.with_suffix(".json")
+    if path == sidecar:
+        return True
+    try:
+        return path.name in read_json_object(sidecar, advice="").get("Files", {})
+    except (InputError, TypeError):
+        return True  # the sidecar itself differs, and is named for it
+
+
+def _people(root: Path, held: Sequence[StoredSession]) -> Iterator[Finding]:
+    """The roster against the sessions: who takes part, with which slot and pseudonym."""
+    roster = Roster(root).listed()
+    place = Roster(root).path.relative_to(root).as_posix()
+    if roster.damaged:
+        yield Finding(
+            place=place, sentence=f"expected a line of everybody, got damage: {roster.damaged}"
+        )
+    for one in held:
+        entry, facts = roster.entries.get(one.files.subject), one.manifest
+        if entry is None:
+            continue  # said above
+        who = one.files.participant
+        if entry["left"] == "withdrawn":
+            sentence = f"expected no data of {who}, who withdrew, got some"
+            yield Finding(place=place, sentence=sentence)
+        wanted = {"slot": facts.slot, "code": facts.code, "simulated": facts.simulated_participant}
+        for name, value in wanted.items():
+            if entry["left"] != "withdrawn" and entry[name] != value:
+                yield Finding(
+                    place=place,
+                    sentence=f"expected {name} {shown(value)} of {who}, as {one.files.stem} says, "
+                    f"got {shown(entry[name])}",
+                    participant=who,
+                )
+    yield from _slots(roster.entries, place)
+
+
+def _slots(entries: Mapping[int, Mapping[str, Any]], place: str) -> Iterator[Finding]:
+    held: dict[int, int] = {}
+    for subject, entry in entries.items():
+        if entry["left"]:
+            continue
+        if entry["slot"] in held:
+            yield Finding(
+                place=place,
+                sentence=f"expected a slot of its own for subject {subject}, got slot "
+                f"{entry['slot']}, which subject {held[entry['slot']]} has",
+            )
+        held[entry["slot"]] = subject
+
+
+def _description(root: Path, held: Sequence[StoredSession]) -> Iterator[Finding]:
+    """The description against the first session, and every session against the description."""
+    begun = [one for one in held if one.state.events]
+    if not begun:
+        return
+    try:
+        found = read_json_object(root / DESCRIPTION_NAME, advice="restore the file")
+    except InputError as error:
+        yield Finding(place=DESCRIPTION_NAME, sentence=f"expected a description, got {error}")
+        return
+    described = [(one, describe_data_set(one.manifest)) for one in begun]
+    # That of a session that was deleted with its participant may have been the first.
+    if not any(all(found.get(n) == made[n] for n in _FIXED) for _, made in described):
+        first, made = min(described, key=lambda pair: pair[0].state.begun_utc)
+        name = next(n for n in _FIXED if found.get(n) != made[n])
+        yield Finding(
+            place=DESCRIPTION_NAME,
+            sentence=f"expected {name} as {first.files.stem} began with, got another",
+        )
+        return
+    for one, made in described:
+        allowed = {record["what"] for record in one.manifest.overrides}
+        for name, what in _OVERRIDDEN:
+            if made[name] != found[name] and what not in allowed:
+                yield Finding(
+                    place=one.files.manifest.relative_to(root).as_posix(),
+                    sentence=f"expected the {what} of the data set, or a reason for another, got "
+                    "another without one",
+                    participant=one.files.participant,
+                )
+
+
+def _chains(
+    root: Path, held: Sequence[StoredSession], damaged: Sequence[Damaged]
+) -> Iterator[Finding]:
+    """Seals that roster and later manifests name must stand in the logs that they name."""
+    roster = Roster(root)
+    listed = roster.listed()
+    seals = {one.files.stem: {event.get("seal") for event in one.state.events} for one in held}
+    unread = {one.files.stem for one in damaged}
+    withdrawn = {
+        f"sub-{n:02d}" for n, entry in listed.entries.items() if entry["left"] == "withdrawn"
+    }
+    place = roster.path.relative_to(root).as_posix()
+    named = [(place, "", one.session, one.seal) for one in listed.seals]
+    named += [
+        (
+            one.files.manifest.relative_to(root).as_posix(),
+            one.files.participant,
+            one.manifest.after.get("session", ""),
+            one.manifest.after.get("seal", ""),
+        )
+        for one in held
+        if one.manifest.after
+    ]
+    noted = {(one.session, one.seal) for one in listed.seals}
+    for where, who, session, seal in named:
+        if session in unread or session.partition("_")[0] in withdrawn:
+            continue
+        about = session.partition("_")[0] if where == place else who
+        if session not in seals:
+            sentence = f"expected the session {shown(session)}, which it names, got none"
+        elif seal not in seals[session]:
+            sentence = f"expected the seal {shown(seal)} in the log of {session}, got another log"
+        elif where != place and (session, seal) not in noted:
+            sentence = f"expected the seal of {session} in {place}, as this says, got none"
+        else:
+            continue
+        yield Finding(place=where, sentence=sentence, participant=about)

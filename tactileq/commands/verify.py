@@ -1,0 +1,40 @@
+"""tactileq verify: is everything as it was stored?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def verify(
+    data: Annotated[Path, typer.Argument(metavar="DATA", help="Folder of the study's answers.")],
+    results: Annotated[
+        Path | None, typer.Argument(metavar="[RESULTS]", help="Results of tactileq analyze.")
+    ] = None,
+) -> None:
+    """Compare a study's data, and results, with what sessions and analysis stored; reads only.
+
+    Draws each order again from study, seed and slot, checks the seals of each log, replays it
+    through its task, makes every table again, and holds roster, description and manifests against
+    each other. Of RESULTS it checks every file, then analyzes again and compares. What differs is
+    named, by file and trial, and the exit code is 1.
+
+    Example: tactileq verify data analysis-results
+    """
+    from experiments.verification.verifying import verify_data
+    from tactileq.verification import print_findings
+    from tactileq.verified_results import verify_results
+
+    found = verify_data(data)
+    print(found.summary)
+    print_findings(found)
+    differs = bool(found.findings)
+    if results is not None:
+        lines = verify_results(data, results)
+        for line in lines:
+            print(line)
+        differs = differs or any(line.startswith("differs") for line in lines)
+    if differs:
+        raise typer.Exit(1)

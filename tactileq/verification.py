@@ -1,0 +1,65 @@
+"""Data as they were stored, or a reason to go on: what analyze and verify share."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Collection
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from experiments.verification.verifying import Verified
+
+MOST_SHOWN = 20
+
+
+def print_findings(found: Verified) -> None:
+    """A line for each difference, on standard error; of many the first ones."""
+    for finding in found.findings[:MOST_SHOWN]:
+        print(f"differs: {finding}", file=sys.stderr)
+    if (more := len(found.findings) - MOST_SHOWN) > 0:
+        print(f"differs: {more} more", file=sys.stderr)
+
+
+def require_verified(
+    data: Path, *, without: Collection[str], unverified: str | None, named: str = ""
+) -> Verified:
+    """What verifying a data folder found, of all but some participants.
+
+    Parameters
+    ----------
+    without : collection of str
+        Participants (sub-01) who are left out.
+    unverified : str, optional
+        Reason to go on where something differs.
+    named : str
+        Of a set-up, what stands before a participant's name.
+
+    Raises
+    ------
+    InputError
+        If something differs and there is no reason to go on.
+    """
+    from experiments.verification.verifying import verify_data
+    from modeling import InputError
+    from modeling.errors import counted
+
+    found = verify_data(data).without(without)
+    if not found.findings:
+        return found
+    if unverified is not None:
+        print_findings(found)
+        return found
+    first, *others = found.findings
+    more = f" (and {counted(len(others), 'more difference')})" if others else ""
+    if others:
+        print_findings(found)
+    advice = "restore it from a copy"
+    if not any(finding.place.startswith("sourcedata") for finding in found.findings):
+        advice = f"make tables again with tactileq study status --data {data}"
+    if first.participant:
+        advice += f", leave the participant out with --exclude {named}{first.participant}=REASON"
+    raise InputError(
+        f"expected data as their sessions stored them, got a difference{more}: "
+        f"{first}; {advice}, or go on with --unverified REASON, which the report says."
+    )
