@@ -77,7 +77,9 @@ def _again(data: Path, there: Mapping[str, Path], note: Mapping[str, Any]) -> It
 
     options = dict(note.get("options", {}))
     folders = ("recordings", "models", "simplified", "plan")
-    lost = [options[name] for name in folders if options.get(name) and not Path(options[name]).exists()]
+    lost = [
+        options[name] for name in folders if options.get(name) and not Path(options[name]).exists()
+    ]
     if "options" not in note or lost:
         yield f"not made again: {lost[0] + ' is not here' if lost else 'an earlier version wrote it'}"
         return

@@ -152,8 +152,9 @@ def onsets_s(events: Sequence[Event]) -> list[float]:
     onsets: list[float] = []
     began: dict[int, float] = {}
     for event in events:
-        run, latest = event["run"], max(onsets, default=0.0)
+        run = event["run"]
         if run not in began:
+            latest = max(onsets, default=0.0)
             since = (_moment(event) - _moment(events[0])).total_seconds()
             began[run] = max(since if onsets else 0.0, latest) - event["t_s"]
         onsets.append(began[run] + event["t_s"])

@@ -25,6 +25,7 @@ from modeling.files.reading import read_bytes
 Event = dict[str, Any]
 OWN_FIELDS = ("n", "utc", "t_s", "run", "event", "seal")
 SESSION_ENDS = ("complete", "aborted", "crashed")
+SEAL_WRITTEN = 8  # last characters of a seal, which an experimenter writes down
 _LONGEST_S = 1e9  # of a run: 30 years
 _SEAL = b', "seal": "%s"}'
 _LINE_AND_MORE = re.compile(rb', "seal": "[0-9a-f]{16}"}.', re.DOTALL)

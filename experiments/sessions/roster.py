@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import os
 import secrets
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from experiments.sessions.files import open_file, sessions_in, write_all
-from experiments.sessions.log import line_of, object_of, utc_text
+from experiments.sessions.log import line_of, object_of, seal_after, utc_text
 from experiments.sessions.writer import StoreError, store_error
 from modeling import InputError
 from modeling.checks import check_whole
@@ -42,11 +42,15 @@ class Listed:
         number and slot stood there is not known.
     seals : tuple of LastSeal
         In the order in which sessions ended.
+    broken : int
+        Number of the first line whose own seal is not over it and all lines before; 0 if none is.
+        Lines before the first one with a seal are an earlier version's.
     """
 
     entries: dict[int, dict[str, Any]]
     damaged: str = ""
     seals: tuple[LastSeal, ...] = ()
+    broken: int = 0
 
 
 @dataclass(frozen=True)
@@ -55,11 +59,6 @@ class LastSeal:
 
     session: str
     seal: str
-
-    @property
-    def to_write_down(self) -> str:
-        """What an experimenter copies by hand: its last 8 characters."""
-        return self.seal[-8:]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,7 +164,7 @@ class Roster:
             If the disk does not take it.
         """
         with self._locked():
-            self._append("sealed", session=sealed.session, seal=sealed.seal)
+            self._append("sealed", session=sealed.session, log_seal=sealed.seal)
 
     def drop(self, subject: int) -> None:
         """Note that a participant will not come again, so that another one gets the slot.
@@ -199,8 +198,9 @@ class Roster:
                 raise self._not_there(subject, listed)
             # Damaged lines stay as they are: they may be all that there is of somebody else.
             lines = self.path.read_bytes().splitlines(keepends=True)
+            withdrawn = {"utc": utc_text(), "event": "withdrawn", "subject": subject}
+            lines.append(_sealed(withdrawn, _last_seal(lines)))
             lines = [_without_code(line, subject) for line in lines]
-            lines.append(line_of({"utc": utc_text(), "event": "withdrawn", "subject": subject}))
             write_bytes(self.path, b"".join(lines))
 
     def subjects(self) -> dict[int, dict[str, Any]]:
@@ -224,6 +224,7 @@ class Roster:
         entries: dict[int, dict[str, Any]] = {}
         seals: list[LastSeal] = []
         damaged = []
+        lines: list[bytes] = []
         if os.path.lexists(self.path):
             *lines, _ = read_bytes(self.path, "the roster").split(b"\n")
             for number, line in enumerate(lines, start=1):
@@ -235,7 +236,12 @@ class Roster:
         here = {files.subject: files.participant for files in sessions_in(self._root)}
         missing = [name for subject, name in here.items() if subject not in entries]
         damaged += [f"no line of {name} in {self.path}" for name in missing]
-        return Listed(entries=entries, damaged=damaged[0] if damaged else "", seals=tuple(seals))
+        return Listed(
+            entries=entries,
+            damaged=damaged[0] if damaged else "",
+            seals=tuple(seals),
+            broken=_first_broken(lines),
+        )
 
     @contextmanager
     def _locked(self) -> Iterator[Listed]:
@@ -302,8 +308,10 @@ class Roster:
         handle = open_file(self.path, new=False)
         try:
             size = os.fstat(handle).st_size
+            values = {"utc": utc_text(), "event": event, **fields}
+            before = _last_seal(self.path.read_bytes().splitlines())
             try:
-                write_all(handle, line_of({"utc": utc_text(), "event": event, **fields}))
+                write_all(handle, _sealed(values, before))
                 os.fsync(handle)
             except OSError:
                 os.ftruncate(handle, size)
@@ -314,6 +322,39 @@ class Roster:
 
 
 _LEFT = {"dropped": "dropped out", "withdrawn": "withdrew"}
+
+
+def _sealed(values: Mapping[str, Any], before: str) -> bytes:
+    """Values as a line that ends with its seal, over what stays when somebody withdraws."""
+    return line_of({**values, "seal": _seal_after(before, values)})
+
+
+def _seal_after(before: str, values: Mapping[str, Any]) -> str:
+    kept = {name: value for name, value in values.items() if name != "seal"}
+    return seal_after(before, line_of(kept | {"code": ""} if "code" in kept else kept))
+
+
+def _last_seal(lines: Sequence[bytes]) -> str:
+    """That of the last line; empty where there is none, or it cannot be read."""
+    try:
+        return str(object_of(lines[-1]).get("seal", ""))
+    except (IndexError, ValueError):
+        return ""
+
+
+def _first_broken(lines: Sequence[bytes]) -> int:
+    """See Listed."""
+    before = ""
+    for number, line in enumerate(lines, start=1):
+        try:
+            values = object_of(line)
+        except ValueError:
+            return number
+        if before or "seal" in values:
+            before = _seal_after(before, values)
+            if values.get("seal") != before:
+                return number
+    return 0
 
 
 def _without_code(line: bytes, subject: int) -> bytes:
@@ -335,7 +376,7 @@ def _enter(
 ) -> None:
     """Note who enrolled or left, or what ended; KeyError, TypeError or ValueError for all else."""
     if event["event"] == "sealed":
-        sealed = LastSeal(event["session"], event["seal"])
+        sealed = LastSeal(event["session"], event["log_seal"])
         if not (isinstance(sealed.session, str) and isinstance(sealed.seal, str)):
             raise TypeError(sealed)
         seals.append(sealed)

@@ -157,7 +157,7 @@ def run_session(
             )
     finally:
         rig.close()
-    return result, store.files.manifest
+    return replace(result, seal=store.seal), store.files.manifest
 
 
 @contextmanager

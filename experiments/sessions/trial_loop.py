@@ -35,7 +35,8 @@ class SessionResult:
     """How a session ended: `answered` of `planned` trials, repeated ones counted among both.
 
     `invalid` of the answers are to trials in which the rig failed. Training trials that were not
-    needed are not planned.
+    needed are not planned. `seal` is that of the last line of the log; empty where an earlier
+    version began it.
     """
 
     planned: int
@@ -43,6 +44,7 @@ class SessionResult:
     invalid: int = 0
     completed: bool = True
     reason: str = ""
+    seal: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,6 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from modeling.files.hashes import sha256_of_file
 from modeling.files.writing import write_text
 
 PROVENANCE_NAME = "provenance.json"
@@ -59,12 +60,15 @@ def write_provenance(
 
 
 def seal_folder(folder: Path, provenance: Mapping[str, Any]) -> None:
-    """Write a folder's provenance, with the names of all files that it holds by now.
+    """Write a folder's provenance, with the names and SHA-256 of all files that it holds by now.
 
-    By these names a later run knows what it may replace.
+    By the names a later run knows what it may replace, by the hashes `verify` what changed.
     """
-    files = sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if not p.is_dir())
-    write_text(folder / PROVENANCE_NAME, provenance_text({**provenance, "files": files}))
+    paths = sorted(path for path in folder.rglob("*") if not path.is_dir())
+    hashes = {path.relative_to(folder).as_posix(): sha256_of_file(path) for path in paths}
+    ordered = dict(sorted(hashes.items()))
+    listed = {"files": list(ordered), "sha256": ordered}
+    write_text(folder / PROVENANCE_NAME, provenance_text({**provenance, **listed}))
 
 
 def provenance_text(values: Mapping[str, Any]) -> str:

@@ -129,6 +129,16 @@ def analyze(
 
     seen = check_own_results(out, "analyze")
     places = _places(data)
+    given = {"recordings": recordings, "models": models, "simplified": simplified, "plan": plan}
+    options = {
+        "data": list(data),
+        **{name: None if path is None else str(path) for name, path in given.items()},
+        "exclude": exclude,
+        "complete": complete,
+        "validate": validate,
+        "unverified": unverified,
+        "seed": seed,
+    }
     inputs = sha256_of_paths(path for path in (*places.values(), *folders) if path is not None)
     responses = read_answers(places, exclude or (), unverified=unverified)
     if plan is not None:
@@ -166,7 +176,7 @@ def analyze(
             seed=seed,
             progress=advance,
         )
-        seal_folder(fresh, provenance)
+        seal_folder(fresh, {**provenance, "options": options})
     for warning in responses.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     print((out / "report.html").resolve())

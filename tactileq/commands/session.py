@@ -68,6 +68,7 @@ def session(
     """
     from experiments.console.languages import require_texts
     from experiments.sessions.bids import export_session
+    from experiments.sessions.log import SEAL_WRITTEN
     from experiments.sessions.overrides import Overrides
     from experiments.sessions.running import Circumstances, run_session
     from experiments.sessions.trial_loop import People
@@ -112,6 +113,8 @@ def session(
             circumstances=circumstances,
         )
     export_session(data, manifest)
+    if result.seal:
+        print(f"seal of this session, for the checklist: {result.seal[-SEAL_WRITTEN:]}")
     if result.invalid:
         print(f"note: the rig failed in {counted(result.invalid, 'trial')}; the log says how.")
     if result.completed:
