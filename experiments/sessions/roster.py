@@ -45,12 +45,15 @@ class Listed:
     broken : int
         Number of the first line whose own seal is not over it and all lines before; 0 if none is.
         Lines before the first one with a seal are an earlier version's.
+    sealed : bool
+        Whether its last line has a seal.
     """
 
     entries: dict[int, dict[str, Any]]
     damaged: str = ""
     seals: tuple[LastSeal, ...] = ()
     broken: int = 0
+    sealed: bool = False
 
 
 @dataclass(frozen=True)
@@ -241,6 +244,7 @@ class Roster:
             damaged=damaged[0] if damaged else "",
             seals=tuple(seals),
             broken=_first_broken(lines),
+            sealed=bool(_last_seal(lines)),
         )
 
     @contextmanager

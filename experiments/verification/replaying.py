@@ -19,7 +19,7 @@ from experiments.study.design import Trial
 from modeling.errors import InputError, shown
 from rig.interface import TextureRig
 
-SLIDER_STEP = 0.1  # to which the log rounds where a slider was released
+NEAR = 0.05 + 1e-9  # of a rating: the log rounds where a slider was released to 0.1
 RELATIVE_ERROR = 1e-6  # of what an adaptive task computes, on another machine
 # By how much the time of an answer may miss what the log's clock says, in s: a rig says when the
 # first sample leaves, the log when the surface was asked for; after the answer the rig falls silent
@@ -151,7 +151,7 @@ class _Recorded:
             if scale not in last:
                 raise ValueError(f"no slider of {scale}")
             stored = self._row.get(name)
-            near = isinstance(stored, int | float) and abs(stored - last[scale]) <= SLIDER_STEP / 2
+            near = isinstance(stored, int | float) and abs(stored - last[scale]) <= NEAR
             ratings[name] = stored if near else last[scale]
         return Rating(response_time_s=self._row["response_time_s"], **ratings)
 

@@ -114,7 +114,7 @@ def verify_data(data_folder: str | Path) -> Verified:
     """
     root = Path(data_folder)
     require_data_folder(root)
-    if not sessions_in(root):
+    if not sessions_in(root) and not Roster(root).path.exists():  # else all withdrew
         return _published(root)
     held, damaged = held_sessions(root)
     ended = [one for one in held if one.state.events and not one.running]
@@ -302,6 +302,12 @@ def _people(root: Path, held: Sequence[StoredSession]) -> Iterator[Finding]:
         yield Finding(
             place=place, sentence=f"expected a line of everybody, got damage: {roster.damaged}"
         )
+    if roster.broken:
+        sentence = f"expected the seal over line {roster.broken} and all before it, got another"
+        yield Finding(place=place, sentence=sentence)
+    elif not roster.sealed and any(one.manifest.after is not None for one in held):
+        sentence = "expected lines with seals, as sessions here write them, got none"
+        yield Finding(place=place, sentence=sentence)
     for one in held:
         entry, facts = roster.entries.get(one.files.subject), one.manifest
         if entry is None:

@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import timedelta
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from experiments.observers.experimenter import SimulatedExperimenter
-from experiments.sessions.bids import export_session
-from experiments.sessions.people import Choice, Intake, Rating
+from experiments.sessions import log
+from experiments.sessions.bids import export_all, export_session
+from experiments.sessions.files import SessionFiles
+from experiments.sessions.people import Choice, Intake, Rating, SessionAborted
 from experiments.sessions.running import Circumstances, run_session
+from experiments.sessions.stored_sessions import held_session
 from experiments.sessions.surfaces import Surfaces
 from experiments.sessions.trial_loop import People, SessionResult
+from experiments.sessions.withdrawing import drop_out, withdraw
 from experiments.study.models import ModelSets
 from experiments.study.questions import Question
 from experiments.study.study import Study
@@ -36,10 +47,16 @@ class Person(Scripted):
     def welcome(self, intake: Intake) -> dict[str, str | int]:
         return {question.name: int(self._rng.integers(18, 80)) for question in intake.questions}
 
+    def _stroke(self, surfaces: Surfaces) -> None:
+        """For a moment; the twin's hand moves on with each reading."""
+        time.sleep(self.thinking_s * self._rng.random())
+        for _ in range(int(self._rng.integers(1, 6))):
+            surfaces.follow_rig_button()
+
     def rate(self, trial: Any, surfaces: Surfaces) -> Rating:
         surfaces.start()
         for _ in range(1 + int(self._rng.integers(3))):
-            time.sleep(self.thinking_s * self._rng.random())
+            self._stroke(surfaces)
             surfaces.toggle()
         given = {}
         for scale in ("magnitude", "frequency"):
@@ -52,7 +69,7 @@ class Person(Scripted):
     def choose(self, trial: Any, surfaces: Surfaces) -> Choice:
         surfaces.start()
         for button in self._rng.permutation(surfaces.count).tolist():
-            time.sleep(self.thinking_s * self._rng.random())
+            self._stroke(surfaces)
             surfaces.present_virtual(button)
         assert surfaces.last is not None
         surfaces.choose(surfaces.last)
@@ -118,3 +135,87 @@ def run_all(
     for task in tasks:
         for subject in (1, 2):
             run_one(root, study, models, task=task, subject=subject)
+
+
+class Stopping(Person):
+    """Stops before an answer."""
+
+    def __init__(self, seed: int, after: int) -> None:
+        super().__init__(seed)
+        self._after = after
+
+    def rate(self, trial: Any, surfaces: Surfaces) -> Rating:
+        if self.answered == self._after:
+            raise SessionAborted("tired")
+        return super().rate(trial, surfaces)
+
+
+def killed(at_s: float, session: Callable[[], object]) -> None:
+    """Run a session in a process of its own that the kernel kills at a moment."""
+    child = os.fork()
+    if child == 0:
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_REAL, at_s)
+        try:
+            session()
+        finally:
+            os._exit(0)
+    os.waitpid(child, 0)
+
+
+def eventful_study(root: Path, models: ModelSets, *, seed: int) -> list[str]:
+    """A study in which much happens, and nothing is tampered with; returns what happened."""
+    rng = np.random.default_rng(seed)
+    study = small_study(("canvas", "PVC"))
+    told = []
+    pilot, simulated = rng.random() < 0.1, rng.random() < 0.3
+
+    def person(subject: int) -> Person:
+        one = Person(seed + subject)
+        one.simulated = simulated
+        return one
+
+    session = partial(run_one, root, study, models, pilot=pilot)
+    left: set[int] = set()
+    for task, subject in ((task, n) for task in ("absolute", "relative") for n in (1, 2)):
+        if subject in left:
+            continue
+        what = str(rng.choice(["whole", "whole", "killed", "stopped", "another day"]))
+        told.append(what)
+        began = {"task": task, "subject": subject}
+        if what == "killed":
+            at_s = float(rng.uniform(0.001, 0.08))
+            killed(at_s, partial(session, **began, respondent=person(subject)))
+        if what == "stopped" and task == "absolute":
+            tired = Stopping(seed, after=int(rng.integers(4)))
+            tired.simulated = simulated
+            session(**began, respondent=tired)
+        there = any(root.glob(f"sourcedata/sub-0{subject}/*/*_task-{task}_manifest.json"))
+        if there and _complete(root, **began):
+            continue  # the kernel came too late
+        if there and rng.random() < 0.3:
+            told.append("left so")  # a session that nobody takes up again
+            continue
+        later = timedelta(days=1, hours=2) if what == "another day" else timedelta()
+        with at_another_time(later):
+            session(**began, respondent=person(subject), resume=there, override="a test")
+        if rng.random() < 0.15:
+            gone = str(rng.choice(["withdrawn", "dropped out"]))
+            told.append(gone)
+            (withdraw if gone == "withdrawn" else drop_out)(root, subject)
+            left.add(subject)
+    export_all(root)
+    return told
+
+
+def _complete(root: Path, *, task: str, subject: int) -> bool:
+    held = held_session(SessionFiles(root=root, task=task, subject=subject, session=1))
+    return held.state.status == "complete"
+
+
+@contextmanager
+def at_another_time(later: timedelta) -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        now = log.now_utc
+        patch.setattr(log, "now_utc", lambda: now() + later)
+        yield

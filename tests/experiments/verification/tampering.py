@@ -498,7 +498,7 @@ def pen_file_added(root: Path) -> None:
 
 @of_tables
 def answers_number(root: Path) -> None:
-    edit_text(table(root, FIRST, "beh.tsv"), r"\t(\d)(\d*\.\d+)\t", r"\t9\2\t")
+    edit_text(table(root, FIRST, "beh.tsv"), r"\t\d+\.\d+\t", "\t99.99\t")
 
 
 @of_tables
@@ -607,7 +607,8 @@ def reseal(root: Path) -> None:
 def reseal_whole(root: Path) -> None:
     """As `reseal`, and the seals that the roster and later manifests name are made anew too."""
     roster = root / "sourcedata" / "roster.jsonl"
-    order = [e["session"] for e in lines(roster) if e["event"] == "sealed"] * roster.exists()
+    events = lines(roster) if roster.exists() else []
+    order = [event["session"] for event in events if event["event"] == "sealed"]
     stems = {p.name.removesuffix("_log.jsonl"): p for p in root.glob("sourcedata/sub-*/*/*_log.*")}
     order = [s for s in order if s in stems] + sorted(set(stems) - set(order))
     after: dict[str, str] = {}
