@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,10 +14,15 @@ MOST_SHOWN = 20
 
 
 def print_findings(found: Verified) -> None:
-    """A line for each difference, on standard error; of many the first ones."""
-    for finding in found.findings[:MOST_SHOWN]:
-        print(f"differs: {finding}", file=sys.stderr)
-    if (more := len(found.findings) - MOST_SHOWN) > 0:
+    """A line for each difference in data, on standard error; of many the first ones."""
+    print_differences([str(finding) for finding in found.findings])
+
+
+def print_differences(sentences: Sequence[str]) -> None:
+    """A line for each, on standard error; of many the first ones."""
+    for sentence in sentences[:MOST_SHOWN]:
+        print(f"differs: {sentence}", file=sys.stderr)
+    if (more := len(sentences) - MOST_SHOWN) > 0:
         print(f"differs: {more} more", file=sys.stderr)
 
 

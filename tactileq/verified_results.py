@@ -1,21 +1,88 @@
-"""Are results those of their data? Files against their hashes, then all of it made again."""
+"""Are models and results those of the data? By hashes; then the analysis is made again."""
 
 from __future__ import annotations
 
 import contextlib
 import io
+import re
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 # What says where results come from, not what they are: paths and versions may differ.
 _ORIGIN = ("provenance.json", "tables/provenance.tsv")
-_PAGES = ("report.html", "supplement.html")
+_PROVENANCE = re.compile(rb'id="table-provenance">.*?</table>', re.DOTALL)
+_FOLDERS = ("recordings", "models", "simplified", "plan")
+_WRITERS = ("tactileq analyze", "tactileq demo")
 
 
-def verify_results(data: Path, results: Path) -> list[str]:
-    """A line for each difference, beginning with "differs", and one that says what was compared.
+def verify_models(data: Path) -> tuple[list[str], str]:
+    """Models and simplifications, where they lie, against the hashes that manifests hold.
+
+    Scenes, which have to be compiled, are left out, and so are models that are not here any more.
+
+    Returns
+    -------
+    list of str
+        A sentence for each difference.
+    str
+        What was compared; empty where no manifest says where models were.
+
+    Raises
+    ------
+    InputError
+        If a file of models is none.
+    """
+    from experiments.sessions.stored_sessions import held_sessions
+    from experiments.study.models import model_sha256
+    from modeling.errors import counted
+    from modeling.models.loading import load_any_models
+    from modeling.perception.verdicts import ENDING, load_simplifications
+
+    held, _ = held_sessions(data)
+    presented = {
+        (name, place, texture, hashes.get(name, ""))
+        for one in held
+        for name, place in one.manifest.model_sources.items()
+        for texture, hashes in one.manifest.models_sha256.items()
+    }
+    places = {Path(place) for _, place, *_ in presented}
+    here = {place for place in places if place.is_dir()}
+    found = {place: load_any_models(place) for place in sorted(here)}
+    simplified = {p: load_simplifications(p) for p in here if any(p.glob(f"*{ENDING}"))}
+    full = {(texture, sha256) for *_, texture, sha256 in presented}
+    differs = []
+    for name, stated, texture, sha256 in sorted(presented):
+        place = Path(stated)
+        if place not in here:
+            continue
+        model = found[place].get(texture)
+        if model is None or model_sha256(model) != sha256:
+            got = "none" if model is None else "another"
+            differs.append(
+                f"{place}: expected the {name} model of {texture} that sessions presented, "
+                f"got {got}"
+            )
+        verdicts = simplified.get(place, {}).get(texture)
+        if verdicts is not None and verdicts.model.sha256 != sha256:
+            differs.append(f"{place}: expected the simplification of that {texture}, got another")
+        elif verdicts is not None and (texture, verdicts.full_sha256) not in full:
+            differs.append(
+                f"{place}: expected {texture} simplified from a model that was presented too, "
+                "got it from another"
+            )
+    if not places:
+        return [], ""
+    absent = ", ".join(str(place) for place in sorted(places - here))
+    said = f"models verified: {counted(len(found), 'set')} of {len(places)}"
+    return differs, said + (f" (not here, or a scene: {absent})" if absent else "")
+
+
+def verify_results(
+    data: Path, results: Path, *, analyze: Callable[..., None]
+) -> tuple[list[str], str]:
+    """A folder of results against its hashes, and against an analysis that is made again.
 
     Parameters
     ----------
@@ -23,6 +90,15 @@ def verify_results(data: Path, results: Path) -> list[str]:
         What the results must be of.
     results : Path
         A folder that `tactileq analyze` wrote.
+    analyze : callable
+        That command, with its options by name.
+
+    Returns
+    -------
+    list of str
+        A sentence for each difference.
+    str
+        What was compared.
 
     Raises
     ------
@@ -30,75 +106,102 @@ def verify_results(data: Path, results: Path) -> list[str]:
         If there are no results of analyze, or they are of other data.
     """
     from modeling import InputError
+    from modeling.errors import counted
     from modeling.files.documents import read_json_object
     from modeling.files.hashes import sha256_of_file
     from modeling.files.provenance import PROVENANCE_NAME
 
     note = read_json_object(results / PROVENANCE_NAME, advice="name a folder of results")
-    if note.get("command") != "tactileq analyze":
+    if "sha256" not in note or note.get("command") not in _WRITERS:
         raise InputError(
             f"expected results of tactileq analyze in {results}, got those of "
-            f"{note.get('command', 'another program')}; name the folder of an analysis."
+            f"{note.get('command', 'another program')}, or of an earlier version; name the folder "
+            "of an analysis."
         )
     _require_data(note, data, results)
-    stated: Mapping[str, str] = note.get("sha256", {})
-    there = {
-        path.relative_to(results).as_posix(): path
-        for path in sorted(results.rglob("*"))
-        if path.is_file() and path.name != PROVENANCE_NAME
-    }
-    lines = [
-        f"differs: {results / name}: expected the file that was written, got "
-        f"{'another' if name in there and name in stated else 'none' if name in stated else 'one'}"
-        for name in sorted({*stated, *there})
-        if name not in there or stated.get(name) != sha256_of_file(there[name])
-    ]
-    again = list(_again(data, there, note))
-    return [*lines, *again] or [f"results verified: {len(there)} files, made again with the same"]
+    stated: Mapping[str, str] = note["sha256"]
+    there = _files_in(results)
+    there.pop(PROVENANCE_NAME)
+    differs = []
+    for name in sorted({*stated, *there}):
+        if name not in there or stated.get(name) != sha256_of_file(there[name]):
+            got = "none" if name not in there else "another" if name in stated else "one"
+            expected = "no such file" if got == "one" else "the file that was written"
+            differs.append(f"{results / name}: expected {expected}, got {got}")
+    said = f"results verified: {counted(len(there), 'file')}"
+    if differs:
+        return differs, f"{said}, {counted(len(differs), 'difference')}; not made again"
+    reason = _not_again(note)
+    if reason:
+        return [], f"{said} as written; not made again ({reason})"
+    again = list(_again(data, there, note, analyze=analyze))
+    versions = _other_versions(note)
+    outcome = counted(len(again), "difference") if again else "the same"
+    return again, f"{said} as written; made again{versions}: {outcome}"
+
+
+def _files_in(folder: Path) -> dict[str, Path]:
+    paths = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path for path in paths}
 
 
 def _require_data(note: Mapping[str, Any], data: Path, results: Path) -> None:
-    """Refuse results of other data."""
+    """Refuse results of other data; a demo's are in its own folder."""
     from modeling import InputError
     from modeling.files.hashes import sha256_of_paths
 
     (now,) = sha256_of_paths([data]).values()
-    stated = note.get("inputs_sha256", {})
-    if now not in stated.values():
+    own = data.resolve().is_relative_to(results.resolve())
+    if not own and now not in note.get("inputs_sha256", {}).values():
         raise InputError(
             f"expected results of the data in {data}, got in {results} those of other data, or of "
             "these before they were changed; analyze them again, or name the data's own results."
         )
 
 
-def _again(data: Path, there: Mapping[str, Path], note: Mapping[str, Any]) -> Iterator[str]:
-    """What differs when the analysis is made again with the same options."""
-    from tactileq.commands.analyze import analyze
+def _not_again(note: Mapping[str, Any]) -> str:
+    """Why an analysis cannot be made again here; empty where it can."""
+    options = note.get("options")
+    if options is None:
+        return f"{note['command']} makes more than an analysis"
+    if len(options["data"]) > 1:
+        return "of several set-ups"
+    lost = [options[n] for n in _FOLDERS if options[n] and not Path(options[n]).exists()]
+    return f"{lost[0]} is not here" if lost else ""
 
-    options = dict(note.get("options", {}))
-    folders = ("recordings", "models", "simplified", "plan")
-    lost = [
-        options[name] for name in folders if options.get(name) and not Path(options[name]).exists()
-    ]
-    if "options" not in note or lost:
-        yield f"not made again: {lost[0] + ' is not here' if lost else 'an earlier version wrote it'}"
-        return
-    options |= {name: Path(options[name]) for name in folders if options.get(name)}
-    options["data"] = [str(data)]
+
+def _other_versions(note: Mapping[str, Any]) -> str:
+    from modeling.files.provenance import version_of
+
+    stated: Mapping[str, str] = note.get("versions", {})
+    other = [f"{n} {v}" for n, v in stated.items() if version_of(n) not in (v, None)]
+    return f" (written with {', '.join(other)})" if other else ""
+
+
+def _again(
+    data: Path,
+    there: Mapping[str, Path],
+    note: Mapping[str, Any],
+    *,
+    analyze: Callable[..., None],
+) -> Iterator[str]:
+    """What differs when the analysis is made again with the same options."""
+    options = dict(note["options"])
+    given = {name: Path(options[name]) for name in _FOLDERS if options[name]}
     with tempfile.TemporaryDirectory() as folder:
         fresh = Path(folder) / "again"
         said = io.StringIO()
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            analyze(**options, out=fresh)
-        for name, path in there.items():
-            made = fresh / name
-            if name in _ORIGIN or name in _PAGES:
-                continue
-            if not made.is_file():
-                yield f"differs: {path}: expected no such file from an analysis made again, got one"
-            elif made.read_bytes() != path.read_bytes():
-                yield f"differs: {path}: expected what an analysis made again gives, got another"
-        for made in sorted(fresh.rglob("*")):
-            name = made.relative_to(fresh).as_posix()
-            if made.is_file() and name not in there and name not in _ORIGIN:
-                yield f"differs: {name}: expected the file that an analysis gives, got none"
+            analyze(**{**options, **given, "data": [str(data)]}, out=fresh)
+        made = _files_in(fresh)
+        for name in sorted({*there, *made}.difference(_ORIGIN)):
+            if name not in made or name not in there:
+                got = "none" if name in made else "one"
+                yield f"{name}: expected what an analysis made again gives, got {got}"
+            elif _without_origin(made[name]) != _without_origin(there[name]):
+                yield f"{name}: expected what an analysis made again gives, got another"
+
+
+def _without_origin(path: Path) -> bytes:
+    """A file; a page without the table of its provenance, which names paths and versions."""
+    return _PROVENANCE.sub(b"", path.read_bytes())

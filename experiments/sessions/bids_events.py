@@ -116,6 +116,8 @@ _FROM_PRESENTATIONS = without(
 EVENT_COLUMNS = (*_OWN, *_FROM_PRESENTATIONS)
 # Answers are in their own tables, the participants' in participants.tsv.
 _ELSEWHERE = ("answers", "row", "manifest_sha256", "overrides", "changed", "cut", "files")
+_KEPT = frozenset(names(_OWN)).difference(_ELSEWHERE, OWN_FIELDS)
+_OF_A_PRESENTATION = names(_FROM_PRESENTATIONS)
 
 
 def event_rows(
@@ -172,9 +174,7 @@ def _moment(event: Event) -> datetime:
 
 
 def _row(event: Event, onset: float, of_trial: list[Mapping[str, str]]) -> dict[str, object]:
-    kept = {k: v for k, v in event.items() if k not in (*_ELSEWHERE, *OWN_FIELDS)}
-    own = names(_OWN)
-    kept = {name: value for name, value in kept.items() if name in own and value is not None}
+    kept = {k: v for k, v in event.items() if k in _KEPT and v is not None}
     index = event.get("index")
     return {
         **kept,
@@ -199,7 +199,7 @@ def _presentation(event: Event, of_trial: list[Mapping[str, str]]) -> dict[str, 
         same_start = abs(float(row["start_s"]) - start_s) < SAME_START_S
         if same_start and row["surface"] == event.get("surface"):
             of_trial.pop(place)
-            found: dict[str, object] = {name: row[name] for name in names(_FROM_PRESENTATIONS)}
+            found: dict[str, object] = {name: row[name] for name in _OF_A_PRESENTATION}
             duration_s = float(row["end_s"]) - float(row["start_s"])
             return {**found, "duration": round(duration_s, 6)}
     return {}

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 from modeling.files.columns import Column, names
@@ -26,31 +27,35 @@ def cell(value: object) -> str:
     get it back as it was. Control characters become their pictures. What a spreadsheet would
     calculate has ' before it (`modeling.files.tables.guarded`).
     """
-    if value is None or value == "":
+    if isinstance(value, str):
+        return _text_cell(value)
+    if value is None:
         return MISSING
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
         return f"{value:.10g}" if math.isfinite(value) else MISSING
-    text = value if isinstance(value, str) else _text(value)
+    if isinstance(value, Mapping | list | tuple):
+        return _text_cell(json.dumps(value, ensure_ascii=False, sort_keys=True))
+    return _text_cell(str(value))
+
+
+@lru_cache(maxsize=4096)  # most cells are one of a few words, or 0
+def _text_cell(text: str) -> str:
+    if not text:
+        return MISSING
     text = guarded(text).translate(_PICTURES).encode("utf-8", "backslashreplace").decode("utf-8")
     return '"' + text.replace('"', '""') + '"' if '"' in text else text
-
-
-def _text(value: object) -> str:
-    if isinstance(value, Mapping | list | tuple):
-        return json.dumps(value, ensure_ascii=False, sort_keys=True)
-    return str(value)
 
 
 def table_bytes(columns: Sequence[Column], rows: Iterable[Mapping[str, object]]) -> bytes:
     """A table with a header; what a row does not have is n/a."""
     header = names(columns)
     lines = ["\t".join(header)]
-    # Most rows have few of the columns, as those of events do.
     for row in rows:
-        cells = {name: cell(value) for name, value in row.items()}
-        lines.append("\t".join(cells.get(name, MISSING) for name in header))
+        # Most rows have few of the columns, as those of events do.
+        cells = [cell(row[name]) if name in row else MISSING for name in header]
+        lines.append("\t".join(cells))
     return ("\n".join(lines) + "\n").encode("utf-8")
 
 

@@ -263,6 +263,7 @@ def _strangers(
     """Files under the name of a session that no session here made."""
     every: list[StoredSession | Damaged] = [*held, *damaged]
     known = {one.files.stem: one.files for one in every}
+    listed = {stem: _listed(files) for stem, files in known.items()}
     for folder in ("sourcedata/sub-*/ses-*", "sub-*/ses-*/beh"):
         for path in sorted(root.glob(f"{folder}/sub-*")):
             match = _OF_A_SESSION.fullmatch(path.name)
@@ -276,7 +277,9 @@ def _strangers(
                     sentence="expected a file of a session that has a manifest, got one of none",
                     participant=match[1],
                 )
-            elif path.parent == known[stem].beh and not _listed(path, known[stem]):
+                continue
+            names = listed[stem]
+            if path.parent == known[stem].beh and names is not None and path.name not in names:
                 yield Finding(
                     place=place,
                     sentence="expected a file that its session's sidecar lists, got another",
@@ -284,14 +287,13 @@ def _strangers(
                 )
 
 
-def _listed(path: Path, files: SessionFiles) -> bool:
+def _listed(files: SessionFiles) -> Collection[str] | None:
+    """Names of the files that a session's sidecar lists; None where it cannot be read."""
     sidecar = files.answers.with_suffix(".json")
-    if path == sidecar:
-        return True
     try:
-        return path.name in read_json_object(sidecar, advice="").get("Files", {})
+        return {sidecar.name, *read_json_object(sidecar, advice="").get("Files", {})}
     except (InputError, TypeError):
-        return True  # the sidecar itself differs, and is named for it
+        return None  # the sidecar itself differs, and is named for it
 
 
 def _people(root: Path, held: Sequence[StoredSession]) -> Iterator[Finding]:

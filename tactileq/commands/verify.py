@@ -17,24 +17,27 @@ def verify(
     """Compare a study's data, and results, with what sessions and analysis stored; reads only.
 
     Draws each order again from study, seed and slot, checks the seals of each log, replays it
-    through its task, makes every table again, and holds roster, description and manifests against
-    each other. Of RESULTS it checks every file, then analyzes again and compares. What differs is
-    named, by file and trial, and the exit code is 1.
+    through its task, makes every table again, and compares roster, description and manifests with
+    each other, and the models with those that were presented. Of RESULTS it checks every file,
+    then analyzes again and compares. What differs is named, by file and trial, and the exit code
+    is 1.
 
     Example: tactileq verify data analysis-results
     """
     from experiments.verification.verifying import verify_data
-    from tactileq.verification import print_findings
-    from tactileq.verified_results import verify_results
+    from tactileq.commands.analyze import analyze
+    from tactileq.verification import print_differences, print_findings
+    from tactileq.verified_results import verify_models, verify_results
 
     found = verify_data(data)
     print(found.summary)
     print_findings(found)
-    differs = bool(found.findings)
+    checks = [verify_models(data)]
     if results is not None:
-        lines = verify_results(data, results)
-        for line in lines:
-            print(line)
-        differs = differs or any(line.startswith("differs") for line in lines)
-    if differs:
+        checks.append(verify_results(data, results, analyze=analyze))
+    for differences, said in checks:
+        if said:
+            print(said)
+        print_differences(differences)
+    if found.findings or any(differences for differences, _ in checks):
         raise typer.Exit(1)
