@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 MOST_SHOWN = 20
 
 
-def print_findings(found: Verified) -> None:
+def print_data_differences(found: Verified) -> None:
     """A line for each difference in data, on standard error; of many the first ones."""
-    print_differences([str(finding) for finding in found.findings])
+    print_differences([str(difference) for difference in found.differences])
 
 
 def print_differences(sentences: Sequence[str]) -> None:
@@ -50,17 +50,17 @@ def require_verified(
     from modeling.errors import counted
 
     found = verify_data(data).without(without)
-    if not found.findings:
+    if not found.differences:
         return found
     if unverified is not None:
-        print_findings(found)
+        print_data_differences(found)
         return found
-    first, *others = found.findings
+    first, *others = found.differences
     more = f" (and {counted(len(others), 'more difference')})" if others else ""
     if others:
-        print_findings(found)
+        print_data_differences(found)
     advice = "restore it from a copy"
-    if not any(finding.place.startswith("sourcedata") for finding in found.findings):
+    if not any(difference.place.startswith("sourcedata") for difference in found.differences):
         advice = f"make tables again with tactileq study status --data {data}"
     if first.participant:
         advice += f", leave the participant out with --exclude {named}{first.participant}=REASON"

@@ -116,10 +116,9 @@ def require_tables(
     *,
     task: str | None = None,
     subject: int | None = None,
-    without: Collection[str] = (),
     otherwise: str,
 ) -> None:
-    """Refuse tables that are not what their sessions wrote; nothing is written.
+    """Refuse tables of sessions that are not what these wrote; nothing is written.
 
     A session that somebody runs now has none yet that could be compared, and of a data set without
     source data nothing is.
@@ -127,9 +126,7 @@ def require_tables(
     Parameters
     ----------
     task, subject : str, int, optional
-        Which sessions are to be read; all, and the tables about people, without them.
-    without : collection of str
-        Participants of whom none is.
+        Which sessions are to be read; all without them.
     otherwise : str
         What to do where a session is damaged, beside restoring it; {who} stands for its
         participant.
@@ -144,8 +141,7 @@ def require_tables(
     held, damaged = held_sessions(root)
 
     def read(files: SessionFiles) -> bool:
-        asked = task in (None, files.task) and subject in (None, files.subject)
-        return asked and files.participant not in without
+        return task in (None, files.task) and subject in (None, files.subject)
 
     for one in damaged:
         if read(one.files):
@@ -153,8 +149,6 @@ def require_tables(
             raise InputError(f"{one.sentence.removesuffix('.')}, or {advice}.")
     ended = (one for one in held if _to_be_shown(one) and read(one.files))
     wrong = [path for one in ended for path in _differing(session_files(one)[0])]
-    if task is None and subject is None:
-        wrong += _differing_people(root, held, damaged, without=without)
     if wrong:
         others = len(wrong) - 1
         more = f" (and {counted(others, 'more file')})" if others else ""
@@ -172,23 +166,13 @@ def differing_tables(
     """Every file that is not there, or is not what all sessions that have ended give, made anew."""
     made = (session_files(one, anew=True)[0] for one in held if _to_be_shown(one))
     wrong = [path for of_one in made for path in _differing(of_one)]
-    wrong += _differing_people(root, held, damaged)
-    with suppress(InputError):  # a description that cannot be read is a finding of its own
-        wrong += _differing(_readme(root))
+    if any(one.files.answers.is_file() for one in held):
+        # Of who has a session running they are those of before.
+        kept = participants_of(one for one in held if one.running)
+        wrong += _differing(_people(root, list(held), damaged=list(damaged), kept=kept))
+        with suppress(InputError):  # a description that cannot be read differs itself
+            wrong += _differing(_readme(root))
     return wrong
-
-
-def _differing_people(
-    root: Path,
-    held: Sequence[StoredSession],
-    damaged: Sequence[Damaged],
-    without: Collection[str] = (),
-) -> list[Path]:
-    if not any(one.files.answers.is_file() for one in held):
-        return []
-    # Of who has a session running they are those of before.
-    kept = {*without, *participants_of(one for one in held if one.running)}
-    return _differing(_people(root, list(held), damaged=list(damaged), kept=kept))
 
 
 def _to_be_shown(held: StoredSession) -> bool:

@@ -8,22 +8,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from experiments.verification.finding import Finding
+from experiments.verification.difference import Difference
 from modeling import InputError
 from modeling.files.documents import read_json_object
 from modeling.files.hashes import sha256_of_file
 
 
-def check_sidecars(root: Path) -> tuple[tuple[Finding, ...], tuple[str, ...]]:
+def check_sidecars(root: Path) -> tuple[tuple[Difference, ...], tuple[str, ...]]:
     """Every file that the sidecar of a session's answers lists, by its SHA-256.
 
     Returns
     -------
-    tuple of Finding
+    tuple of Difference
     tuple of str
         The sessions, as sub-01_ses-01_task-absolute.
     """
-    found: list[Finding] = []
+    found: list[Difference] = []
     sessions = []
     for table in sorted(root.glob("sub-*/ses-*/beh/sub-*_beh.tsv")):
         sessions.append(table.name.removesuffix("_beh.tsv"))
@@ -31,28 +31,28 @@ def check_sidecars(root: Path) -> tuple[tuple[Finding, ...], tuple[str, ...]]:
     return tuple(found), tuple(sessions)
 
 
-def _of_session(root: Path, table: Path) -> list[Finding]:
+def _of_session(root: Path, table: Path) -> list[Difference]:
     sidecar, who = table.with_suffix(".json"), table.parts[-4]
 
-    def finding(path: Path, sentence: str) -> Finding:
+    def differs(path: Path, sentence: str) -> Difference:
         place = path.relative_to(root).as_posix()
-        return Finding(place=place, sentence=sentence, participant=who)
+        return Difference(place=place, sentence=sentence, participant=who)
 
     try:
         stated = read_json_object(sidecar, advice="restore the file").get("Files")
     except InputError as error:
-        return [finding(sidecar, f"expected the sidecar of the answers, got {error}")]
+        return [differs(sidecar, f"expected the sidecar of the answers, got {error}")]
     if not isinstance(stated, Mapping):
-        return [finding(sidecar, "expected the SHA-256 of the session's files, got none")]
+        return [differs(sidecar, "expected the SHA-256 of the session's files, got none")]
     found = []
     stem = table.name.removesuffix("beh.tsv")
     for path in sorted(table.parent.glob(f"{stem}*")):
         if path != sidecar and path.name not in stated:
-            found.append(finding(path, "expected a file that its sidecar lists, got another"))
+            found.append(differs(path, "expected a file that its sidecar lists, got another"))
     for name, sha256 in stated.items():
         path = table.parent / Path(str(name)).name
         if not path.is_file():
-            found.append(finding(path, "expected the file that its sidecar lists, got none"))
+            found.append(differs(path, "expected the file that its sidecar lists, got none"))
         elif sha256_of_file(path) != sha256:
-            found.append(finding(path, "expected the SHA-256 in its sidecar, got another"))
+            found.append(differs(path, "expected the SHA-256 in its sidecar, got another"))
     return found

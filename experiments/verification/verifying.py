@@ -22,7 +22,7 @@ from experiments.sessions.stored_sessions import Damaged, StoredSession, held_se
 from experiments.study.study import Study, plan_sha256
 from experiments.tasks import task_named
 from experiments.verification.copies import copied
-from experiments.verification.finding import Finding
+from experiments.verification.difference import Difference
 from experiments.verification.replaying import contradictions
 from experiments.verification.sidecars import check_sidecars
 from modeling import InputError
@@ -51,7 +51,7 @@ class Verified:
 
     Parameters
     ----------
-    findings : tuple of Finding
+    differences : tuple of Difference
         Empty where everything is as it was stored.
     sessions : tuple of str
         Those that have ended, as sub-01_ses-01_task-absolute.
@@ -65,7 +65,7 @@ class Verified:
         Whether there are logs; without, only hashes in sidecars could be compared.
     """
 
-    findings: tuple[Finding, ...]
+    differences: tuple[Difference, ...]
     sessions: tuple[str, ...]
     running: tuple[str, ...] = ()
     unsealed: tuple[str, ...] = ()
@@ -74,14 +74,14 @@ class Verified:
 
     def without(self, participants: Collection[str]) -> Verified:
         """Without what is about these participants (sub-01) alone."""
-        kept = tuple(f for f in self.findings if f.participant not in participants)
+        kept = tuple(f for f in self.differences if f.participant not in participants)
         sessions = tuple(s for s in self.sessions if s.partition("_")[0] not in participants)
-        return replace(self, findings=kept, sessions=sessions)
+        return replace(self, differences=kept, sessions=sessions)
 
     @property
     def summary(self) -> str:
         """One line, as 68 of 68 sessions verified, seal 3fa9c1d2."""
-        wrong = {Path(finding.place).name for finding in self.findings}
+        wrong = {Path(one.place).name for one in self.differences}
         sound = sum(not any(w.startswith(f"{s}_") for w in wrong) for s in self.sessions)
         said = f"{sound} of {counted(len(self.sessions), 'session')} verified"
         if not self.with_source:
@@ -92,8 +92,8 @@ class Verified:
             said += f", {len(self.unsealed)} without seals (of an earlier version)"
         if self.running:
             said += f", {len(self.running)} still running"
-        if self.findings:
-            said += f"; {counted(len(self.findings), 'difference')}"
+        if self.differences:
+            said += f"; {counted(len(self.differences), 'difference')}"
         return said
 
 
@@ -119,7 +119,7 @@ def verify_data(data_folder: str | Path) -> Verified:
     held, damaged = held_sessions(root)
     ended = [one for one in held if one.state.events and not one.running]
     found = [
-        Finding(place=_in(root, one), sentence=one.sentence, participant=one.files.participant)
+        Difference(place=_in(root, one), sentence=one.sentence, participant=one.files.participant)
         for one in damaged
     ]
     for one in ended:
@@ -130,12 +130,12 @@ def verify_data(data_folder: str | Path) -> Verified:
     found += _description(root, held)
     found += _chains(root, held, damaged)
     found += [
-        Finding(place=_in(root, one), sentence=sentence, participant=one.files.participant)
+        Difference(place=_in(root, one), sentence=sentence, participant=one.files.participant)
         for one, sentence in copied(ended)
     ]
     seals = {one.files.stem: _seal(one) for one in ended}
     return Verified(
-        findings=tuple(found),
+        differences=tuple(found),
         sessions=(*seals, *(one.files.stem for one in damaged)),
         running=tuple(one.files.stem for one in held if one.running),
         unsealed=tuple(stem for stem, seal in seals.items() if not seal),
@@ -151,13 +151,13 @@ def seal_of_study(seals: Mapping[str, str]) -> str:
 
 def _published(root: Path) -> Verified:
     """Data without sessions' own files: only what sidecars state can be compared."""
-    findings, sessions = check_sidecars(root)
+    differences, sessions = check_sidecars(root)
     if not sessions:
         raise InputError(
             f"expected the data folder of a study, got {root}, in which there is no session; name "
             "the one that holds sourcedata or sub-01."
         )
-    return Verified(findings=findings, sessions=sessions, with_source=False)
+    return Verified(differences=differences, sessions=sessions, with_source=False)
 
 
 def _in(root: Path, one: StoredSession | Damaged) -> str:
@@ -168,13 +168,13 @@ def _seal(one: StoredSession) -> str:
     return str(one.state.events[-1].get("seal", ""))
 
 
-def _of_session(root: Path, one: StoredSession) -> Iterator[Finding]:
+def _of_session(root: Path, one: StoredSession) -> Iterator[Difference]:
     """Its order drawn again, its hashes, its log replayed, and the files beside it."""
     who, log = one.files.participant, _in(root, one)
     manifest = one.files.manifest.relative_to(root).as_posix()
 
-    def finding(place: str, sentence: str, trial: int | None = None) -> Finding:
-        return Finding(place=place, sentence=sentence, trial=trial, participant=who)
+    def differs(place: str, sentence: str, trial: int | None = None) -> Difference:
+        return Difference(place=place, sentence=sentence, trial=trial, participant=who)
 
     try:
         study, task = Study.from_dict(one.manifest.study), task_named(one.manifest.task)
@@ -183,29 +183,29 @@ def _of_session(root: Path, one: StoredSession) -> Iterator[Finding]:
             study, task, subject=facts.subject, session=facts.session, slot=facts.slot
         )
     except InputError as error:
-        yield finding(manifest, f"expected a study by which its order can be drawn, got {error}")
+        yield differs(manifest, f"expected a study by which its order can be drawn, got {error}")
         return
     drawn = [plain(trial.to_dict()) for trial in plan.trials]
     for wanted, got in zip(drawn, facts.trials, strict=False):
         if wanted != got:
             names = [n for n in {**wanted, **got} if wanted.get(n) != got.get(n)]
-            yield finding(
+            yield differs(
                 manifest,
                 f"expected {names[0]} {shown(wanted.get(names[0]))}, as study, seed and slot give "
                 f"it, got {shown(got.get(names[0]))}",
                 wanted["trial"],
             )
     if len(drawn) != len(facts.trials):
-        yield finding(manifest, f"expected {len(drawn)} trials, got {len(facts.trials)}")
+        yield differs(manifest, f"expected {len(drawn)} trials, got {len(facts.trials)}")
     if plan_sha256(study, facts.models_sha256) != facts.plan_sha256:
-        yield finding(manifest, "expected the plan_sha256 of this study and these models")
+        yield differs(manifest, "expected the plan_sha256 of this study and these models")
     if _equal_sets(facts.models_sha256, study.models_of(facts.task)) != {
         texture: {frozenset(group) for group in groups}
         for texture, groups in facts.identical.items()
     }:
-        yield finding(manifest, "expected under identical the sets whose models have one SHA-256")
+        yield differs(manifest, "expected under identical the sets whose models have one SHA-256")
     for trial, sentence in contradictions(one, task):
-        yield finding(log, sentence, trial)
+        yield differs(log, sentence, trial)
     yield from _beside(root, one)
 
 
@@ -223,7 +223,7 @@ def _equal_sets(
     return found
 
 
-def _beside(root: Path, one: StoredSession) -> Iterator[Finding]:
+def _beside(root: Path, one: StoredSession) -> Iterator[Difference]:
     """The files beside the log, whose hashes its last line holds unless it was killed."""
     *_, last = one.state.events
     if last["event"] != "stored":
@@ -235,7 +235,7 @@ def _beside(root: Path, one: StoredSession) -> Iterator[Finding]:
         if stored.get(name) != hashes.get(name):
             got = "none" if name not in hashes else "another"
             expected = "no such file" if name not in stored else "the file that its log names"
-            yield Finding(
+            yield Difference(
                 place=(one.files.folder / name).relative_to(root).as_posix(),
                 sentence=f"expected {expected}, got {'one' if name not in stored else got}",
                 participant=one.files.participant,
@@ -244,13 +244,13 @@ def _beside(root: Path, one: StoredSession) -> Iterator[Finding]:
 
 def _tables(
     root: Path, held: Sequence[StoredSession], damaged: Sequence[Damaged]
-) -> Iterator[Finding]:
+) -> Iterator[Difference]:
     """Every table, made again from the log."""
     for path in differing_tables(root, held, damaged):
         got = "another" if path.exists() else "none"
         place = path.relative_to(root).as_posix()
         name = place.partition("/")[0]
-        yield Finding(
+        yield Difference(
             place=place,
             sentence=f"expected the table that its log gives, got {got}",
             participant=name if name.startswith("sub-") else "",
@@ -259,7 +259,7 @@ def _tables(
 
 def _strangers(
     root: Path, held: Sequence[StoredSession], damaged: Sequence[Damaged]
-) -> Iterator[Finding]:
+) -> Iterator[Difference]:
     """Files under the name of a session that no session here made."""
     every: list[StoredSession | Damaged] = [*held, *damaged]
     known = {one.files.stem: one.files for one in every}
@@ -272,7 +272,7 @@ def _strangers(
             stem = next((s for s in known if path.name.startswith(f"{s}_")), None)
             place = path.relative_to(root).as_posix()
             if stem is None or path.parent not in (known[stem].folder, known[stem].beh):
-                yield Finding(
+                yield Difference(
                     place=place,
                     sentence="expected a file of a session that has a manifest, got one of none",
                     participant=match[1],
@@ -280,7 +280,7 @@ def _strangers(
                 continue
             names = listed[stem]
             if path.parent == known[stem].beh and names is not None and path.name not in names:
-                yield Finding(
+                yield Difference(
                     place=place,
                     sentence="expected a file that its session's sidecar lists, got another",
                     participant=match[1],
@@ -296,20 +296,20 @@ def _listed(files: SessionFiles) -> Collection[str] | None:
         return None  # the sidecar itself differs, and is named for it
 
 
-def _people(root: Path, held: Sequence[StoredSession]) -> Iterator[Finding]:
+def _people(root: Path, held: Sequence[StoredSession]) -> Iterator[Difference]:
     """The roster against the sessions: who takes part, with which slot and pseudonym."""
     roster = Roster(root).listed()
     place = Roster(root).path.relative_to(root).as_posix()
     if roster.damaged:
-        yield Finding(
+        yield Difference(
             place=place, sentence=f"expected a line of everybody, got damage: {roster.damaged}"
         )
     if roster.broken:
         sentence = f"expected the seal over line {roster.broken} and all before it, got another"
-        yield Finding(place=place, sentence=sentence)
+        yield Difference(place=place, sentence=sentence)
     elif not roster.sealed and any(one.manifest.after is not None for one in held):
         sentence = "expected lines with seals, as sessions here write them, got none"
-        yield Finding(place=place, sentence=sentence)
+        yield Difference(place=place, sentence=sentence)
     for one in held:
         entry, facts = roster.entries.get(one.files.subject), one.manifest
         if entry is None:
@@ -317,11 +317,11 @@ def _people(root: Path, held: Sequence[StoredSession]) -> Iterator[Finding]:
         who = one.files.participant
         if entry["left"] == "withdrawn":
             sentence = f"expected no data of {who}, who withdrew, got some"
-            yield Finding(place=place, sentence=sentence)
+            yield Difference(place=place, sentence=sentence)
         wanted = {"slot": facts.slot, "code": facts.code, "simulated": facts.simulated_participant}
         for name, value in wanted.items():
             if entry["left"] != "withdrawn" and entry[name] != value:
-                yield Finding(
+                yield Difference(
                     place=place,
                     sentence=f"expected {name} {shown(value)} of {who}, as {one.files.stem} says, "
                     f"got {shown(entry[name])}",
@@ -330,13 +330,13 @@ def _people(root: Path, held: Sequence[StoredSession]) -> Iterator[Finding]:
     yield from _slots(roster.entries, place)
 
 
-def _slots(entries: Mapping[int, Mapping[str, Any]], place: str) -> Iterator[Finding]:
+def _slots(entries: Mapping[int, Mapping[str, Any]], place: str) -> Iterator[Difference]:
     held: dict[int, int] = {}
     for subject, entry in entries.items():
         if entry["left"]:
             continue
         if entry["slot"] in held:
-            yield Finding(
+            yield Difference(
                 place=place,
                 sentence=f"expected a slot of its own for subject {subject}, got slot "
                 f"{entry['slot']}, which subject {held[entry['slot']]} has",
@@ -344,7 +344,7 @@ def _slots(entries: Mapping[int, Mapping[str, Any]], place: str) -> Iterator[Fin
         held[entry["slot"]] = subject
 
 
-def _description(root: Path, held: Sequence[StoredSession]) -> Iterator[Finding]:
+def _description(root: Path, held: Sequence[StoredSession]) -> Iterator[Difference]:
     """The description against the first session, and every session against the description."""
     begun = [one for one in held if one.state.events]
     if not begun:
@@ -352,14 +352,14 @@ def _description(root: Path, held: Sequence[StoredSession]) -> Iterator[Finding]
     try:
         found = read_json_object(root / DESCRIPTION_NAME, advice="restore the file")
     except InputError as error:
-        yield Finding(place=DESCRIPTION_NAME, sentence=f"expected a description, got {error}")
+        yield Difference(place=DESCRIPTION_NAME, sentence=f"expected a description, got {error}")
         return
     described = [(one, describe_data_set(one.manifest)) for one in begun]
     # That of a session that was deleted with its participant may have been the first.
     if not any(all(found.get(n) == made[n] for n in _FIXED) for _, made in described):
         first, made = min(described, key=lambda pair: pair[0].state.begun_utc)
         name = next(n for n in _FIXED if found.get(n) != made[n])
-        yield Finding(
+        yield Difference(
             place=DESCRIPTION_NAME,
             sentence=f"expected {name} as {first.files.stem} began with, got another",
         )
@@ -368,7 +368,7 @@ def _description(root: Path, held: Sequence[StoredSession]) -> Iterator[Finding]
         allowed = {record["what"] for record in one.manifest.overrides}
         for name, what in _OVERRIDDEN:
             if made[name] != found[name] and what not in allowed:
-                yield Finding(
+                yield Difference(
                     place=one.files.manifest.relative_to(root).as_posix(),
                     sentence=f"expected the {what} of the data set, or a reason for another, got "
                     "another without one",
@@ -378,7 +378,7 @@ def _description(root: Path, held: Sequence[StoredSession]) -> Iterator[Finding]
 
 def _chains(
     root: Path, held: Sequence[StoredSession], damaged: Sequence[Damaged]
-) -> Iterator[Finding]:
+) -> Iterator[Difference]:
     """Seals that roster and later manifests name must stand in the logs that they name."""
     roster = Roster(root)
     listed = roster.listed()
@@ -412,4 +412,4 @@ def _chains(
             sentence = f"expected the seal of {session} in {place}, as this says, got none"
         else:
             continue
-        yield Finding(place=where, sentence=sentence, participant=about)
+        yield Difference(place=where, sentence=sentence, participant=about)

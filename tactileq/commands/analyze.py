@@ -254,7 +254,7 @@ def read_answers(
         setups[name] = replace(
             load_responses(place, leaving_out=without),
             verified=(found.summary,),
-            unverified=(unverified or "") if found.findings else "",
+            unverified=(unverified or "") if found.differences else "",
         )
     responses = pool_setups(setups) if len(setups) > 1 else next(iter(setups.values()))
     return leave_out(responses, reasons)

@@ -26,12 +26,12 @@ def verify(
     """
     from experiments.verification.verifying import verify_data
     from tactileq.commands.analyze import analyze
-    from tactileq.verification import print_differences, print_findings
+    from tactileq.verification import print_data_differences, print_differences
     from tactileq.verified_results import verify_models, verify_results
 
     found = verify_data(data)
     print(found.summary)
-    print_findings(found)
+    print_data_differences(found)
     checks = [verify_models(data)]
     if results is not None:
         checks.append(verify_results(data, results, analyze=analyze))
@@ -39,5 +39,5 @@ def verify(
         if said:
             print(said)
         print_differences(differences)
-    if found.findings or any(differences for differences, _ in checks):
+    if found.differences or any(differences for differences, _ in checks):
         raise typer.Exit(1)

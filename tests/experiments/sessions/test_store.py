@@ -77,9 +77,9 @@ def test_everything_stands_in_the_log_in_its_order(
         store.log("slider", value=float("nan"))
         store.finish("aborted", "felt ill", by="participant")
     events = read_log(store.files.log).events
-    assert [event["n"] for event in events] == [1, 2, 3, 4, 5]
-    assert [event["run"] for event in events] == [1] * 5
-    names = ["opened", "presented", "answer", "slider", "ended"]
+    assert [event["n"] for event in events] == [1, 2, 3, 4, 5, 6]
+    assert [event["run"] for event in events] == [1] * 6
+    names = ["opened", "presented", "answer", "slider", "ended", "stored"]
     assert [event["event"] for event in events] == names
     assert events[0]["manifest_sha256"] == SessionManifest.load(store.files.manifest).sha256
     assert events[1]["start_s"] == 0.25
@@ -408,7 +408,7 @@ def test_resuming_keeps_the_manifest_and_says_what_has_changed(
         assert len(store.manifest.trials) == 6
         assert store.before.runs == 1
     assert store.files.manifest.read_bytes() == before
-    opened = read_log(store.files.log).events[-1]
+    opened = read_log(store.files.log).events[-2]
     assert (opened["resumed"], opened["run"], opened["changed"]) == (True, 2, {"language": "ja"})
 
 
@@ -429,7 +429,7 @@ def test_a_changed_study_or_model_is_resumed_for_a_stated_reason(
         SessionStore.resume(tmp_path, now)
     assert contents(tmp_path) == before
     SessionStore.resume(tmp_path, now, overrides=Overrides("typing error")).close()
-    opened = read_log(manifest_of().files(tmp_path).log).events[-1]
+    opened = read_log(manifest_of().files(tmp_path).log).events[-2]
     assert opened["overrides"] == [{"what": what, "reason": "typing error"}]
     differing = {name: now.values[name] for name in (f"{what}_sha256", *changed)}
     assert opened["changed"] == differing
@@ -466,13 +466,19 @@ def test_what_cannot_be_resumed(tmp_path: Path, manifest: SessionManifest) -> No
 def test_half_a_line_is_kept_by_the_next_run(tmp_path: Path, manifest: SessionManifest) -> None:
     with SessionStore.create(tmp_path, manifest) as store:
         store.answer(1, row_of(1))
-    half = line_of({"n": 3, "told": "ü"})[:-4]
+    half = line_of({"n": 4, "told": "ü"})[:-4]
     store.files.log.write_bytes(store.files.log.read_bytes() + half)
     assert session_state(store.files.log).cut
     SessionStore.resume(tmp_path, manifest).close()
     events = read_log(store.files.log).events
-    assert [event["event"] for event in events] == ["opened", "answer", "opened"]
-    assert events[2]["cut"] == half.decode("utf-8", "backslashreplace")
+    assert [event["event"] for event in events] == [
+        "opened",
+        "answer",
+        "stored",
+        "opened",
+        "stored",
+    ]
+    assert events[3]["cut"] == half.decode("utf-8", "backslashreplace")
 
 
 # One data set

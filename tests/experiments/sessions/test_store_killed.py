@@ -195,5 +195,5 @@ def test_eight_consoles_at_once(tmp_path: Path) -> None:
         assert not any("\n" in text for text in refusals)
         files = SessionFiles(root=tmp_path / "data", task="absolute", subject=subject, session=1)
         events = read_log(files.log).events
-        assert [event["event"] for event in events] == ["opened", "answer", "ended"]
+        assert [event["event"] for event in events] == ["opened", "answer", "ended", "stored"]
     assert sorted(Roster(tmp_path / "data").subjects()) == [1, 2]

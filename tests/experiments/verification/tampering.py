@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from experiments.sessions.bids import export_all
-from experiments.sessions.log import line_of, sealed_line
+from experiments.sessions.log import line_of
+from tests.experiments.sealing import sealed
 
 FIRST = "sub-01_ses-01_task-absolute"
 SECOND = "sub-02_ses-01_task-absolute"
@@ -625,20 +626,17 @@ def reseal_whole(root: Path) -> None:
 
 
 def _reseal_log(path: Path) -> str:
-    before = ""
-    made = []
     stem = path.name.removesuffix("_log.jsonl")
     beside = {p.name: sha256(p) for p in path.parent.glob(f"{stem}_*") if p != path}
-    for number, event in enumerate(lines(path), start=1):
-        event.pop("seal", None)
+    events = lines(path)
+    for event in events:
         if event["event"] == "opened":
             event["manifest_sha256"] = beside.get(f"{stem}_manifest.json", "")
         if event["event"] == "stored":
             event["files"] = beside
-        line, before = sealed_line({**event, "n": number}, before)
-        made.append(line)
-    path.write_bytes(b"".join(made))
-    return before
+    text, seal = sealed(events)
+    path.write_bytes(text)
+    return seal
 
 
 def _reseal_roster(root: Path, seals: dict[str, str]) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)
-class Finding:
+class Difference:
     """A difference between what is there and what must have been stored.
 
     Parameters
