@@ -56,15 +56,13 @@ def require_verified(
         print_data_differences(found)
         return found
     first, *others = found.differences
-    more = f" (and {counted(len(others), 'more difference')})" if others else ""
-    if others:
-        print_data_differences(found)
+    more = f" (and {counted(len(others), 'more difference')}; all: tactileq verify {data})"
     advice = "restore it from a copy"
     if not any(difference.place.startswith("sourcedata") for difference in found.differences):
         advice = f"make tables again with tactileq study status --data {data}"
     if first.participant:
         advice += f", leave the participant out with --exclude {named}{first.participant}=REASON"
     raise InputError(
-        f"expected data as their sessions stored them, got a difference{more}: "
+        f"expected data as their sessions stored them, got a difference{more * bool(others)}: "
         f"{first}; {advice}, or go on with --unverified REASON, which the report says."
     )

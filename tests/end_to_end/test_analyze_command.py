@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from analysis.answers import loading
-from modeling.files.hashes import sha256_of_paths
+from modeling.files.hashes import sha256_of_file, sha256_of_paths
 from tactileq.commands.analyze import _later_plan, read_answers
 
 
@@ -58,7 +58,7 @@ def test_claims_are_those_of_the_study_and_others_exploratory(
 
     def edited_meanwhile(*given: Any, **named: Any) -> Any:
         responses = real(*given, **named)
-        (data / "README").write_text("edited while it was read\n")
+        (data / "notes.txt").write_text("added while it was read\n")
         return responses
 
     with monkeypatch.context() as meanwhile:
@@ -119,7 +119,7 @@ def test_tables_that_differ_from_their_log_are_named_and_only_status_changes_the
     assert refused.returncode == 1
     assert refused.stderr.count("\n") == 1
     name = table.relative_to(data)
-    assert f"data/{name}, which differs (and 1 more file)" in refused.stderr
+    assert f"1 more difference; all: tactileq verify data): {name}: " in refused.stderr
     assert "tactileq study status --data data" in refused.stderr
     assert contents(data) == before
     status = main("study", "status", "--data", "data")
@@ -152,11 +152,10 @@ def test_a_damaged_session_is_named_and_nobody_is_lost_without_a_word(main, data
     assert "sub-03 was left out by hand: damaged on the stick." in found.warnings
     # Nothing of theirs is read that cannot be, and they took part: nobody is missing.
     next(data.glob("sourcedata/sub-03/ses-01/*_manifest.json")).write_text("{")
-    for lost in (data / "README", next(data.glob("sub-03/ses-01/beh/*absolute_beh.tsv"))):
-        lost.unlink()
-        found = read_answers({"": data}, without)
-        assert found.answers["absolute"].equals(wanted)
-        assert found.unfinished == ()
+    next(data.glob("sub-03/ses-01/beh/*absolute_beh.tsv")).unlink()
+    found = read_answers({"": data}, without)
+    assert found.answers["absolute"].equals(wanted)
+    assert found.unfinished == ()
 
 
 def test_several_set_ups_have_names_and_answers_of_their_own(main, data: Path) -> None:
@@ -174,9 +173,11 @@ def test_incomplete_pairs_are_refused_and_complete_ones_offered(main, data: Path
     (path,) = data.glob("sub-03/ses-01/beh/*_task-absolute_beh.tsv")
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(lines[:-1]))
-    (log,) = data.glob("sourcedata/sub-03/ses-01/*_task-absolute_log.jsonl")
-    log.with_name(log.name.replace("log.jsonl", "manifest.json")).unlink()
-    log.unlink()  # as in data that are given to others, without what they were made from
+    shutil.rmtree(data / "sourcedata")  # as in data that are given to others
+    sidecar = path.with_suffix(".json")
+    described = json.loads(sidecar.read_text())
+    described["Files"][path.name] = sha256_of_file(path)
+    sidecar.write_text(json.dumps(described))
     refused = main("analyze", "data")
     assert refused.returncode == 1
     assert refused.stderr.count("\n") == 1

@@ -120,7 +120,7 @@ def test_a_folder_that_is_not_one(main, tmp_path: Path) -> None:
     assert_refused(main("model", "nowhere"), expected="folder", got=["nowhere", "recordings.tsv"])
     assert_refused(main("model", "notes"), expected=["recordings.tsv", "WAV", "notes"])
     assert_refused(main("model", "notes/a.txt"), expected="folder", got="notes/a.txt")
-    assert_refused(main("analyze", "notes"), names="notes/dataset_description.json")
+    assert_refused(main("analyze", "notes"), expected="study", got="notes")
     assert not (tmp_path / "models").exists()
 
 

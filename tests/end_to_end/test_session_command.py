@@ -81,7 +81,7 @@ def test_a_session_that_is_ended_by_a_signal_goes_on_and_ends_with_its_terminal(
     _, told = first.communicate(timeout=SECONDS)
     assert first.returncode == 128 + signal.SIGTERM
     assert "interrupted by SIGTERM" in told
-    ended = log_of(study)[-1]
+    ended = log_of(study)[-2]
     assert (ended["event"], ended["status"]) == ("ended", "aborted")
     assert (ended["by"], ended["reason"]) == ("signal", "SIGTERM")
 
@@ -94,7 +94,7 @@ def test_a_session_that_is_ended_by_a_signal_goes_on_and_ends_with_its_terminal(
     assert "ended early (the experimenter's terminal was closed)" in shown
     assert "MDF" not in shown
     assert "simplified" not in shown
-    ended = log_of(study)[-1]
+    ended = log_of(study)[-2]
     assert (ended["status"], ended["by"]) == ("aborted", "experimenter")
     (table,) = study.glob("data/sub-01/ses-01/beh/*_beh.tsv")
     assert len(table.read_text().splitlines()) == 1  # nobody has answered

@@ -7,6 +7,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
@@ -30,7 +31,9 @@ from experiments.study.questions import Question
 from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import task_named
+from modeling import Threshold, simplify
 from rig.twin import SimulatedRig
+from stimuli.planted.textures import planted_texture
 from tests.experiments.scripted import Scripted
 
 
@@ -78,9 +81,18 @@ class Person(Scripted):
         return Choice(button=surfaces.last, response_time_s=taken_s)
 
 
-def small_study(textures: tuple[str, ...]) -> Study:
-    """Two people, three tasks, one question."""
-    rated = TaskPlan(participants=2, schedule="interleaved", training_trials=1)
+def small_models(textures: tuple[str, ...]) -> ModelSets:
+    """Planted textures, and what the paper's rule leaves of them."""
+    full = {texture: planted_texture(texture) for texture in textures}
+    rule = {"criterion": "paper-fft", "margin_db": 15.0}
+    threshold = Threshold.shipped("codec")
+    simplified = {name: simplify(model, threshold, **rule).model for name, model in full.items()}
+    return ModelSets(sets={"full": full, "simplified": simplified})
+
+
+def small_study(textures: tuple[str, ...], *, participants: int = 2) -> Study:
+    """Three tasks, one question."""
+    plan = TaskPlan(participants=participants, schedule="interleaved", training_trials=1)
     return Study(
         name="Small",
         seed=11,
@@ -88,9 +100,9 @@ def small_study(textures: tuple[str, ...]) -> Study:
         trays=dict(zip(textures, "CABDEFG", strict=False)),
         questions=(Question(name="age", least=18, most=99),),
         tasks={
-            "absolute": rated,
-            "relative": TaskPlan(participants=2, schedule="interleaved", training_trials=1),
-            "threshold": TaskPlan(participants=2, schedule="interleaved"),
+            "absolute": plan,
+            "relative": plan,
+            "threshold": replace(plan, training_trials=0),
         },
     )
 

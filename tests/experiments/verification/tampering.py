@@ -627,7 +627,8 @@ def reseal_whole(root: Path) -> None:
 
 def _reseal_log(path: Path) -> str:
     stem = path.name.removesuffix("_log.jsonl")
-    beside = {p.name: sha256(p) for p in path.parent.glob(f"{stem}_*") if p != path}
+    others = sorted(p for p in path.parent.glob(f"{stem}_*") if p != path)
+    beside = {p.name: sha256(p) for p in others}
     events = lines(path)
     for event in events:
         if event["event"] == "opened":
