@@ -179,7 +179,8 @@ def write_report(
         drawing,
         title=title,
         banner=_banner(responses, textures),
-        verified=_verified(responses, textures),
+        real=_real(responses, textures),
+        verified=() if responses is None else responses.verified,
         facts={**(provenance or {}), "seed of this report": seed},
         progress=report_progress,
     )
@@ -194,6 +195,7 @@ def _write_pages(
     *,
     title: str,
     banner: str,
+    real: Sequence[str],
     verified: Sequence[str],
     facts: Mapping[str, object],
     progress: Progress,
@@ -210,13 +212,13 @@ def _write_pages(
     overview = (
         "overview",
         "At a glance",
-        _overview(sections, files, verified=verified),
+        _overview(sections, files, real=real),
     )
     html = page(
         title=title,
         answer=headline.subject,
         points=headline.points,
-        lead=headline.lead,
+        lead=" ".join(filter(None, [headline.lead, *(f"{line}." for line in verified)])),
         banner=banner,
         sections=[overview, *(chapter.whole() for chapter in chapters)],
         kind="report",
@@ -324,11 +326,12 @@ def _with_identical(responses: Responses, textures: Sequence[TextureResult]) -> 
     return replace(responses, equal=equal)
 
 
-def _overview(sections: Sequence[Section], files: _Files, *, verified: Sequence[str]) -> str:
+def _overview(sections: Sequence[Section], files: _Files, *, real: Sequence[str]) -> str:
     """The first page below its answer: who, pictures, and what bears on the answer."""
     # An unfinished task is reported in its own section and in the one on the verdicts.
     tiles_once = list(dict.fromkeys(tile for section in sections for tile in section.tiles))
-    of_chapters = [sentence for section in sections for sentence in section.verified]
+    verified = [sentence for section in sections for sentence in section.verified]
+    verified += [f"Real: {', '.join(real)}."] * bool(real)
     warned = [sentence for section in sections for sentence in section.cautions]
     caution = f'<div class="caution"><h3>What must not be concluded</h3>{bullets(warned)}</div>'
     below = {
@@ -336,7 +339,7 @@ def _overview(sections: Sequence[Section], files: _Files, *, verified: Sequence[
             sentence for section in sections for sentence in section.deviations
         ],
         "Reliability": [sentence for section in sections for sentence in section.reliability],
-        "What was verified": [*of_chapters, *verified],
+        "What was verified": verified,
     }
     columns = "".join(
         f"<div><h3>{heading}</h3>{bullets(sentences)}</div>"
@@ -348,13 +351,6 @@ def _overview(sections: Sequence[Section], files: _Files, *, verified: Sequence[
         + files.html([picture for section in sections for picture in section.front])
         + f'<div class="front">{columns}{caution * bool(warned)}</div>'
     )
-
-
-def _verified(responses: Responses | None, textures: Sequence[TextureResult]) -> list[str]:
-    """How far the answers are as they were stored, and what is not simulated."""
-    lines = [] if responses is None else [f"{line}." for line in responses.verified]
-    real = _real(responses, textures)
-    return lines + [f"Real: {', '.join(real)}."] * bool(real)
 
 
 def _real(responses: Responses | None, textures: Sequence[TextureResult]) -> list[str]:

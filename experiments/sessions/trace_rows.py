@@ -48,9 +48,10 @@ def presentation_rows(
 ) -> tuple[list[dict[str, str]], tuple[str, ...]]:
     """The presentations in these starts of the session as text, and what is damaged."""
     found = _rows(path, PRESENTATION_COLUMNS, runs=runs)
-    cells = (map(unguarded, row.decode("utf-8", "replace").split("\t")) for row in found.rows)
+    cells = (row.decode("utf-8", "replace").split("\t") for row in found.rows)
     header = names(PRESENTATION_COLUMNS)
-    return [dict(zip(header, row, strict=True)) for row in cells], found.damaged
+    shown = (map(unguarded, row) if "'" in "".join(row) else row for row in cells)
+    return [dict(zip(header, row, strict=True)) for row in shown], found.damaged
 
 
 def _rows(path: Path, columns: Columns, *, runs: Collection[int]) -> TraceRows:

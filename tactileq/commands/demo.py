@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tactileq.commands.analyze import read_answers
 from tactileq.commands.simulate import run_study
 from tactileq.commands.stimuli import render_set
 from tactileq.demo_benches import Benches, begun_scenes, reported
@@ -175,10 +176,9 @@ def write_demo_report(
 ) -> None:
     """The report of everything in the demo's folder, with a progress bar."""
     from analysis.answers.hand import load_hand
-    from analysis.answers.loading import load_responses
     from analysis.report.report import write_report
 
-    responses = load_responses(folder / "data")
+    responses = read_answers({"": folder / "data"}, ())
     with share_of("Analyzing") as advance:
         write_report(
             folder / "report.html",

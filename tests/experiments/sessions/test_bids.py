@@ -10,6 +10,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -31,6 +32,7 @@ from experiments.sessions.bids_events import onsets_s
 from experiments.sessions.bids_physio import RATE_HZ, at_regular_times
 from experiments.sessions.bids_tables import cell, table_bytes
 from experiments.sessions.files import SessionFiles
+from experiments.sessions.log import Log, read_log
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.session_store import SessionStore
 from experiments.sessions.stored_sessions import held_sessions
@@ -552,3 +554,24 @@ def test_a_table_without_source_beside_others_with_it_is_left_alone(study_on_dis
     assert differing(study_on_disk) == []
     assert export_all(study_on_disk) == Exported()
     assert contents(study_on_disk) == before
+
+
+def test_after_a_session_only_its_participants_logs_are_read(
+    write_session: Callable[..., SessionFiles], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """So an export takes no longer the more people have taken part."""
+    for subject in (1, 2, 3):
+        files = write_session(subject=subject)
+        export_session(files.root, files.manifest)
+    second = write_session("relative", subject=2)
+    read: list[str] = []
+
+    def noted(path: Path) -> Log:
+        read.append(Path(path).name[:6])
+        return read_log(path)
+
+    monkeypatch.setattr("experiments.sessions.state.read_log", noted)
+    export_session(second.root, second.manifest)
+    assert set(read) == {"sub-02"}
+    monkeypatch.undo()
+    assert export_all(second.root) == Exported()  # nothing is left to be made

@@ -60,6 +60,17 @@ FOUND_ANYWAY = (
     "roster_slot",
     "roster_deleted",
 )
+# Those that are not found where the roster is sealed anew: docs/method/verification.md#tampering
+NOT_FOUND_ANEW = (
+    "person_withdrawn_who_did_not",
+    "roster_dropout_added",
+    "roster_lines_exchanged",
+)
+
+
+def test_nine_in_ten_kinds_are_found_where_logs_and_roster_are_sealed_anew() -> None:
+    assert set(NOT_FOUND_ANEW) < set(STORED)
+    assert len(NOT_FOUND_ANEW) <= 0.1 * len(STORED)
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +100,7 @@ def test_tampering_is_found(kind: str, copied: Path) -> None:
     assert verify_data(copied).differences
 
 
-@pytest.mark.parametrize("kind", STORED)
+@pytest.mark.parametrize("kind", [kind for kind in STORED if kind not in NOT_FOUND_ANEW])
 def test_tampering_is_found_where_logs_and_roster_are_sealed_anew(kind: str, copied: Path) -> None:
     STORED[kind](copied)
     reseal(copied)
