@@ -9,7 +9,7 @@ from typing import Literal
 
 from modeling.errors import InputError
 
-Extra = Literal["console", "rig", "chart"]
+Extra = Literal["console", "rig", "chart", "publish"]
 CONSOLE_BEFORE = (3, 13)  # PsychoPy's own limit, in pyproject.toml as well
 
 

@@ -31,6 +31,7 @@ COMMANDS = {
     "threshold": "threshold",
     "simulate": "simulate",
     "verify": "verify",
+    "publish": "publish",
     "analyze": "analyze",
     "demo": "demo",
     "import": "imports",

@@ -108,7 +108,6 @@ def verify_results(
     from modeling import InputError
     from modeling.errors import counted
     from modeling.files.documents import read_json_object
-    from modeling.files.hashes import sha256_of_file
     from modeling.files.provenance import PROVENANCE_NAME
 
     note = read_json_object(results / PROVENANCE_NAME, advice="name a folder of results")
@@ -118,16 +117,10 @@ def verify_results(
             f"{note.get('command', 'another program')}, or of an earlier version; name the folder "
             "of an analysis."
         )
-    _require_data(note, data, results)
-    stated: Mapping[str, str] = note["sha256"]
+    require_data(note, data, results)
     there = _files_in(results)
     there.pop(PROVENANCE_NAME)
-    differs = []
-    for name in sorted({*stated, *there}):
-        if name not in there or stated.get(name) != sha256_of_file(there[name]):
-            got = "none" if name not in there else "another" if name in stated else "one"
-            expected = "no such file" if got == "one" else "the file that was written"
-            differs.append(f"{results / name}: expected {expected}, got {got}")
+    differs = list(_changed(results, there, note["sha256"]))
     said = f"results verified: {counted(len(there), 'file')}"
     if differs:
         return differs, f"{said}, {counted(len(differs), 'difference')}; not made again"
@@ -140,12 +133,57 @@ def verify_results(
     return again, f"{said} as written; made again{versions}: {outcome}"
 
 
+def verify_archive(archive: Path) -> tuple[list[str], str]:
+    """Every file of an archive against the hashes that it holds, and these against its seal.
+
+    Returns
+    -------
+    list of str
+        A sentence for each difference.
+    str
+        What was compared.
+
+    Raises
+    ------
+    InputError
+        If its provenance cannot be read.
+    """
+    from modeling.errors import counted
+    from modeling.files.documents import read_json_object
+    from modeling.files.provenance import PROVENANCE_NAME
+    from tactileq.archive import seal_of_files
+
+    note = read_json_object(archive / PROVENANCE_NAME, advice="restore the archive")
+    stated: Mapping[str, str] = note.get("sha256", {})
+    there = _files_in(archive)
+    there.pop(PROVENANCE_NAME)
+    differs = list(_changed(archive, there, stated))
+    if (seal := seal_of_files(stated)) != note.get("seal"):
+        sentence = f"expected the seal {seal} over its hashes, got {note.get('seal')}"
+        differs.append(f"{archive / PROVENANCE_NAME}: {sentence}")
+    said = f"archive verified: {counted(len(there), 'file')}"
+    if differs:
+        return differs, f"{said}, {counted(len(differs), 'difference')}"
+    return [], f"{said} as written, seal {seal}"
+
+
+def _changed(folder: Path, there: Mapping[str, Path], stated: Mapping[str, str]) -> Iterator[str]:
+    """Files that are not as their hashes say, not there, or not listed."""
+    from modeling.files.hashes import sha256_of_file
+
+    for name in sorted({*stated, *there}):
+        if name not in there or stated.get(name) != sha256_of_file(there[name]):
+            got = "none" if name not in there else "another" if name in stated else "one"
+            expected = "no such file" if got == "one" else "the file that was written"
+            yield f"{folder / name}: expected {expected}, got {got}"
+
+
 def _files_in(folder: Path) -> dict[str, Path]:
     paths = sorted(path for path in folder.rglob("*") if path.is_file())
     return {path.relative_to(folder).as_posix(): path for path in paths}
 
 
-def _require_data(note: Mapping[str, Any], data: Path, results: Path) -> None:
+def require_data(note: Mapping[str, Any], data: Path, results: Path) -> None:
     """Refuse results of other data; a demo's are in its own folder."""
     from modeling import InputError
     from modeling.files.hashes import sha256_of_paths

@@ -202,7 +202,7 @@ class Roster:
             # Damaged lines stay as they are: they may be all that there is of somebody else.
             lines = self.path.read_bytes().splitlines(keepends=True)
             withdrawn = {"utc": utc_text(), "event": "withdrawn", "subject": subject}
-            lines.append(_sealed(withdrawn, _last_seal(lines)))
+            lines.append(sealed_roster_line(withdrawn, _last_seal(lines))[0])
             lines = [_without_code(line, subject) for line in lines]
             write_bytes(self.path, b"".join(lines))
 
@@ -315,7 +315,7 @@ class Roster:
             values = {"utc": utc_text(), "event": event, **fields}
             before = _last_seal(self.path.read_bytes().splitlines())
             try:
-                write_all(handle, _sealed(values, before))
+                write_all(handle, sealed_roster_line(values, before)[0])
                 os.fsync(handle)
             except OSError:
                 os.ftruncate(handle, size)
@@ -328,9 +328,13 @@ class Roster:
 _LEFT = {"dropped": "dropped out", "withdrawn": "withdrew"}
 
 
-def _sealed(values: Mapping[str, Any], before: str) -> bytes:
-    """Values as a line that ends with its seal, over what stays when somebody withdraws."""
-    return line_of({**values, "seal": _seal_after(before, values)})
+def sealed_roster_line(values: Mapping[str, Any], before: str) -> tuple[bytes, str]:
+    """Values as a line that ends with its seal, over what stays when somebody withdraws; the seal.
+
+    `before` is the seal of the line before, empty for the first.
+    """
+    seal = _seal_after(before, values)
+    return line_of({**values, "seal": seal}), seal
 
 
 def _seal_after(before: str, values: Mapping[str, Any]) -> str:

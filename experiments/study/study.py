@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
+from experiments.study.publication import PublicationSection
 from experiments.study.questions import Question
 from experiments.study.task_plan import (
     PAPER_PLANS,
@@ -76,6 +77,7 @@ class Study(DescribedFile):
     """
 
     WHAT: ClassVar[str] = "a study file"
+    OPTIONAL: ClassVar[frozenset[str]] = frozenset({"publication"})
     name: Annotated[Label, key("title of the study")]
     seed: Annotated[
         int,
@@ -149,6 +151,10 @@ class Study(DescribedFile):
     measured_force: Annotated[
         bool, key("refuses a rig whose force is assumed, such as a mouse")
     ] = False
+    publication: Annotated[
+        PublicationSection | None,
+        key("who is named when the data are published; no part of what identifies the study"),
+    ] = None
     tasks: Annotated[
         Mapping[str, TaskPlan],
         key("those of the paper are planned as there where they are not named", tables=TASKS),
@@ -251,6 +257,10 @@ class Study(DescribedFile):
         """
         plan = self.plan_of(task)
         return len(plan.models) if plan.schedule == "by-day" else 1
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values of what fixes the experiment, so without the publication."""
+        return {name: value for name, value in super().to_dict().items() if name != "publication"}
 
     @property
     def sha256(self) -> str:

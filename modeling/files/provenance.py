@@ -64,11 +64,16 @@ def seal_folder(folder: Path, provenance: Mapping[str, Any]) -> None:
 
     By the names a later run knows what it may replace, by the hashes `verify` what changed.
     """
-    paths = sorted(path for path in folder.rglob("*") if not path.is_dir())
-    hashes = {path.relative_to(folder).as_posix(): sha256_of_file(path) for path in paths}
-    ordered = dict(sorted(hashes.items()))
-    listed = {"files": list(ordered), "sha256": ordered}
+    hashes = sha256_of_files(folder)
+    listed = {"files": list(hashes), "sha256": hashes}
     write_text(folder / PROVENANCE_NAME, provenance_text({**provenance, **listed}))
+
+
+def sha256_of_files(folder: Path) -> dict[str, str]:
+    """SHA-256 of each file in a folder by its path there, in the order of these."""
+    paths = [path for path in folder.rglob("*") if not path.is_dir()]
+    hashes = {path.relative_to(folder).as_posix(): sha256_of_file(path) for path in paths}
+    return dict(sorted(hashes.items()))
 
 
 def provenance_text(values: Mapping[str, Any]) -> str:

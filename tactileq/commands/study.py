@@ -8,6 +8,7 @@ from tactileq.commands.study_check import study_check
 from tactileq.commands.study_init import study_init
 from tactileq.commands.study_plan import study_plan
 from tactileq.commands.study_status import study_status
+from tactileq.commands.study_validate import study_validate
 from tactileq.commands.study_withdraw import study_dropout, study_withdraw
 
 study = typer.Typer(
@@ -21,3 +22,4 @@ study.command("plan")(study_plan)
 study.command("status")(study_status)
 study.command("dropout")(study_dropout)
 study.command("withdraw")(study_withdraw)
+study.command("validate")(study_validate)

@@ -1,0 +1,230 @@
+"""A copy of a data set that identifies no participant: without times of day, free text, pseudonyms.
+
+docs/method/publishing.md#redacted
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+from experiments.sessions.bids import export_all
+from experiments.sessions.data_set import DESCRIPTION_NAME
+from experiments.sessions.log import Event, object_of, sealed_line, utc_text
+from experiments.sessions.roster import Roster, sealed_roster_line
+from experiments.sessions.stored_sessions import StoredSession, held_sessions
+from modeling import InputError
+from modeling.files.documents import dump_json, read_json_object
+from modeling.files.hashes import sha256_of_paths
+from modeling.files.reading import read_bytes
+from modeling.files.writing import write_bytes, write_text
+
+# When everybody's first session begins; others of the day follow after ten minutes each. At noon,
+# so that a reader's time zone does not make another day of it.
+BEGINNING = datetime(2000, 1, 1, 12, tzinfo=UTC)
+_NEXT = timedelta(minutes=10)
+LEFT_OUT = "not published"
+# Fields of a log that hold what people typed, or what a machine said about itself.
+_TEXT = ("told", "reason", "advice")
+# Who writes the reason of an end; what the program writes tells nothing about a person.
+_BY_PROGRAM = ("program", "signal")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Redacted:
+    """What a copy was made from.
+
+    Parameters
+    ----------
+    seals : mapping of session to str
+        Of the original logs' last lines; empty for those that an earlier version wrote.
+    secrets : tuple of str
+        What must not stand anywhere in what is published: pseudonyms.
+    """
+
+    seals: Mapping[str, str]
+    secrets: tuple[str, ...]
+
+
+def redact(
+    data_folder: Path,
+    out: Path,
+    *,
+    sources: Mapping[str, str],
+    described: Mapping[str, Any],
+    free_text: bool = False,
+) -> Redacted:
+    """Copy a data set without what identifies participants, sealed anew, with all its tables.
+
+    Parameters
+    ----------
+    data_folder : path
+        Of which nothing differs from what its sessions stored (`verify_data`).
+    out : path
+        A folder that does not exist.
+    sources : mapping of set of models to str
+        Where the models are in what is published, for the manifests.
+    described : mapping
+        What the description of the data set states in addition, such as authors.
+    free_text : bool
+        Whether to keep what people typed: reasons of overrides and of ends, and faults as told.
+
+    Raises
+    ------
+    InputError
+        For a session that is damaged or running.
+    """
+    held, damaged = held_sessions(data_folder)
+    if damaged:
+        raise InputError(damaged[0].sentence)
+    if running := [one.files.stem for one in held if one.running]:
+        raise InputError(
+            f"expected sessions that have ended, got {running[0]}, which is running; publish when "
+            "it has ended."
+        )
+    lines = read_bytes(Roster(data_folder).path, "the roster").splitlines()
+    roster = [object_of(line) for line in lines]
+    begins = dict(_beginnings(held))
+    change = _Change(sources=sources, free_text=free_text)
+    # A manifest names a seal in the log of a session that began earlier.
+    in_order = sorted(held, key=lambda one: (not one.state.events, one.state.begun_utc))
+    new_seals: _Seals = {}
+    for one in in_order:
+        files = one.manifest.files(out)
+        files.folder.mkdir(parents=True, exist_ok=True)
+        _copy_session(one, files.folder, change, begins[one.files.stem], seals=new_seals)
+    _write_roster(out, roster, new_seals)
+    description = read_json_object(data_folder / DESCRIPTION_NAME, advice="restore the file")
+    write_text(out / DESCRIPTION_NAME, dump_json({**description, **described}))
+    export_all(out)
+    return Redacted(
+        seals={one.files.stem: str(_last(one).get("seal", "")) for one in held},
+        secrets=tuple(e["code"] for e in roster if e["event"] == "enrolled" and e["code"]),
+    )
+
+
+# A session and a seal in its log, with the seal of the same line in the copy.
+_Seals = dict[tuple[str, str], str]
+
+
+def _last(one: StoredSession) -> Event:
+    return one.state.events[-1] if one.state.events else {}
+
+
+def _beginnings(held: Sequence[StoredSession]) -> Iterator[tuple[str, datetime]]:
+    """When each session begins in the copy: days stay apart as they were, times of day do not."""
+    by_person: dict[str, list[StoredSession]] = {}
+    for one in held:
+        if one.state.events:
+            by_person.setdefault(one.files.participant, []).append(one)
+        else:
+            yield one.files.stem, BEGINNING
+    for sessions in by_person.values():
+        in_order = sorted(sessions, key=lambda one: one.state.begun_utc)
+        first = datetime.fromisoformat(in_order[0].state.begun_utc).date()
+        for place, one in enumerate(in_order):
+            days = datetime.fromisoformat(one.state.begun_utc).date() - first
+            yield one.files.stem, BEGINNING + days + place * _NEXT
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Change:
+    """What becomes of manifests and events."""
+
+    sources: Mapping[str, str]
+    free_text: bool
+
+    def manifest(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        changed = dict(values)
+        if "subject" in changed:
+            changed["code"] = published_code(changed["subject"])
+        if "platform" in changed:
+            changed["platform"] = changed["platform"].partition("-")[0]
+        if "model_sources" in changed:
+            changed["model_sources"] = dict(self.sources)
+        if "overrides" in changed:
+            changed["overrides"] = self._overrides(changed["overrides"])
+        return changed
+
+    def event(self, event: Event) -> dict[str, Any]:
+        changed = dict(event)
+        for name in _TEXT:
+            if isinstance(changed.get(name), str) and event.get("by") not in _BY_PROGRAM:
+                changed[name] = self._text(changed[name])
+        if "overrides" in changed:
+            changed["overrides"] = self._overrides(changed["overrides"])
+        if "changed" in changed:
+            changed["changed"] = self.manifest(changed["changed"])
+        if "cut" in changed:
+            changed["cut"] = self._text(changed["cut"])
+        return changed
+
+    def _overrides(self, overrides: Sequence[Mapping[str, str]]) -> list[dict[str, str]]:
+        return [{**one, "reason": self._text(one["reason"])} for one in overrides]
+
+    def _text(self, text: str) -> str:
+        return text if self.free_text or not text else LEFT_OUT
+
+
+def published_code(subject: int) -> str:
+    """What stands for a pseudonym, which only the participant and the laboratory know."""
+    return f"P-{subject:03d}"
+
+
+def _copy_session(
+    one: StoredSession,
+    folder: Path,
+    change: _Change,
+    begins: datetime,
+    *,
+    seals: _Seals,
+) -> None:
+    """Manifest, log and what lies beside it; notes the new seals of all lines."""
+    manifest = folder / one.files.manifest.name
+    log = folder / one.files.log.name
+    values = read_json_object(one.files.manifest, advice="restore the file")
+    values = change.manifest(values)
+    if after := values.get("after"):
+        named = (after["session"], after["seal"])
+        values["after"] = {**after, "seal": seals.get(named, after["seal"])}  # or of who withdrew
+    write_text(manifest, dump_json(values))
+    for path in one.files.there():
+        if path not in (one.files.manifest, one.files.log):
+            shutil.copyfile(path, folder / path.name)
+    beside = sorted(path for path in folder.glob(f"{one.files.stem}_*") if path != log)
+    hashes = {Path(path).name: sha256 for path, sha256 in sha256_of_paths(beside).items()}
+    if not one.state.events:
+        return
+    first = datetime.fromisoformat(one.state.begun_utc)
+    seal, lines = "", []
+    for event in one.state.events:
+        moment = begins + (datetime.fromisoformat(event["utc"]) - first)
+        changed = {**change.event(event), "utc": utc_text(moment)}
+        if changed["event"] == "opened":
+            changed["manifest_sha256"] = hashes[manifest.name]
+        if changed["event"] == "stored":
+            changed["files"] = hashes
+        was = changed.pop("seal", "")
+        line, seal = sealed_line(changed, seal)
+        lines.append(line)
+        seals[one.files.stem, was] = seal
+    write_bytes(log, b"".join(lines))
+
+
+def _write_roster(out: Path, roster: Sequence[Event], seals: _Seals) -> None:
+    seal, lines = "", []
+    for event in roster:
+        changed: dict[str, Any] = {**event, "utc": utc_text(BEGINNING)}
+        changed.pop("seal", None)
+        if changed.get("code"):
+            changed["code"] = published_code(changed["subject"])
+        if changed["event"] == "sealed":
+            named = (changed["session"], changed["log_seal"])
+            changed["log_seal"] = seals.get(named, changed["log_seal"])  # or of who withdrew
+        line, seal = sealed_roster_line(changed, seal)
+        lines.append(line)
+    write_bytes(Roster(out).path, b"".join(lines))
