@@ -21,6 +21,7 @@ HOMES = {
     "sessions.running": "Circumstances run_session",
     "sessions.trial_loop": "People SessionResult run_trials",
     "tasks": "plan_session task_named",
+    "publishing.presented": "render_presentation",
     "observers.psychometrics": "Psychometrics Trait",
     "observers.percepts": "Perception",
     "observers.in_memory": "simulate_sessions",
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from experiments.observers.psychometrics import Psychometrics as Psychometrics
     from experiments.observers.psychometrics import Trait as Trait
     from experiments.observers.whole_study import simulate_study as simulate_study
+    from experiments.publishing.presented import render_presentation as render_presentation
     from experiments.sessions.running import Circumstances as Circumstances
     from experiments.sessions.running import run_session as run_session
     from experiments.sessions.task import Task as Task

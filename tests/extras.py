@@ -47,7 +47,11 @@ NEEDING = {
     ),
     "distributed": ("end_to_end/test_power_command.py::test_dask",),
     "importlinter": ("test_rooms.py",),
-    "bids_validator_deno": ("experiments/sessions/test_bids.py::test_the_validator",),
+    "bids_validator_deno": (
+        "experiments/sessions/test_bids.py::test_the_validator",
+        "end_to_end/test_publish_command.py",
+    ),
+    "rocrate": ("end_to_end/test_publish_command.py",),
 }
 LACKING = {module: tests for module, tests in NEEDING.items() if find_spec(module) is None}
 

@@ -28,8 +28,8 @@ from modeling.files.writing import write_bytes, write_text
 BEGINNING = datetime(2000, 1, 1, 12, tzinfo=UTC)
 _NEXT = timedelta(minutes=10)
 LEFT_OUT = "not published"
-# Fields of a log that hold what people typed, or what a machine said about itself.
-_TEXT = ("told", "reason", "advice")
+# By event, the field that holds what people typed, or what a machine said about itself.
+_TEXT = {"ended": "reason", "fault": "told"}
 # Who writes the reason of an end; what the program writes tells nothing about a person.
 _BY_PROGRAM = ("program", "signal")
 
@@ -90,10 +90,8 @@ def redact(
     roster = [object_of(line) for line in lines]
     begins = dict(_beginnings(held))
     change = _Change(sources=sources, free_text=free_text)
-    # A manifest names a seal in the log of a session that began earlier.
-    in_order = sorted(held, key=lambda one: (not one.state.events, one.state.begun_utc))
     new_seals: _Seals = {}
-    for one in in_order:
+    for one in _in_order(held):
         files = one.manifest.files(out)
         files.folder.mkdir(parents=True, exist_ok=True)
         _copy_session(one, files.folder, change, begins[one.files.stem], seals=new_seals)
@@ -113,6 +111,16 @@ _Seals = dict[tuple[str, str], str]
 
 def _last(one: StoredSession) -> Event:
     return one.state.events[-1] if one.state.events else {}
+
+
+def _in_order(held: Sequence[StoredSession]) -> Iterator[StoredSession]:
+    """Each session after the one whose seal its manifest names; no clock is trusted in this."""
+    left = {one.files.stem: one for one in held}
+    while left:
+        named = {stem: (one.manifest.after or {}).get("session") for stem, one in left.items()}
+        free = [stem for stem, session in named.items() if session == stem or session not in left]
+        for stem in free or list(left):  # in a circle none comes first; then no seal is found
+            yield left.pop(stem)
 
 
 def _beginnings(held: Sequence[StoredSession]) -> Iterator[tuple[str, datetime]]:
@@ -152,9 +160,9 @@ class _Change:
 
     def event(self, event: Event) -> dict[str, Any]:
         changed = dict(event)
-        for name in _TEXT:
-            if isinstance(changed.get(name), str) and event.get("by") not in _BY_PROGRAM:
-                changed[name] = self._text(changed[name])
+        name = _TEXT.get(event["event"], "")
+        if isinstance(changed.get(name), str) and event.get("by") not in _BY_PROGRAM:
+            changed[name] = self._text(changed[name])
         if "overrides" in changed:
             changed["overrides"] = self._overrides(changed["overrides"])
         if "changed" in changed:

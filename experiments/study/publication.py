@@ -35,6 +35,7 @@ class AuthorSection(FileSection):
     """An author of the data."""
 
     WHERE: ClassVar[str] = "[[publication.authors]]"
+    OPTIONAL: ClassVar[frozenset[str]] = frozenset({"orcid", "affiliation"})
     family: Annotated[Label, key("family name")]
     given: Annotated[Label, key("given names")]
     orcid: Annotated[
@@ -54,6 +55,7 @@ class PublicationSection(FileSection):
     """What an archive of the study states beside its data."""
 
     WHERE: ClassVar[str] = "[publication]"
+    OPTIONAL: ClassVar[frozenset[str]] = frozenset({"description", "license", "ethics", "doi"})
     authors: Annotated[
         tuple[AuthorSection, ...], key("in the order in which they are named", min_length=1)
     ]

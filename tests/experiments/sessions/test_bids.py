@@ -6,10 +6,7 @@ import errno
 import gzip
 import io
 import json
-import os
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -44,27 +41,11 @@ from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.columns import Column
 from modeling.files.tables import guarded
 from rig.twin import SimulatedRig
+from tactileq.bids_validator import bids_issues
 from tests.experiments.sessions.conftest import STUDY, session_on_disk
 from tests.refusals import refused
 
-VALIDATOR = Path(sys.executable).with_name("bids-validator-deno")
 PERSON = {"age": 31, "sex": "not said", "handedness": "right", "hours_of_sleep": 7.5}
-
-
-def validated(folder: Path) -> list[dict[str, str]]:
-    """What the BIDS validator says, by its own schema, without the network."""
-    # The program that it runs in lies beside it.
-    path = f"{VALIDATOR.parent}{os.pathsep}{os.environ['PATH']}"
-    ended = subprocess.run(
-        [str(VALIDATOR), "--format", "json", "--max-rows", "-1", str(folder)],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-        env={**os.environ, "PATH": path, "DENO_NO_UPDATE_CHECK": "1"},
-    )
-    issues: list[dict[str, str]] = json.loads(ended.stdout)["issues"]["issues"]
-    return issues
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -117,7 +98,7 @@ def test_the_validator_finds_no_error(study_on_disk, write_session, tmp_path, ki
         files = write_session(answers={**PERSON, "age": 99}, **people)
         write_session("relative", answered=3, status=None, pilot=False, **people)
         export_all(files.root)
-    found = validated(tmp_path / "data")
+    found = bids_issues(tmp_path / "data")
     assert [issue for issue in found if issue["severity"] == "error"] == []
     # What it would like to know besides, and nobody here knows.
     allowed = {"JSON_KEY_RECOMMENDED", "SIDECAR_KEY_RECOMMENDED"} | {
@@ -156,7 +137,7 @@ def test_the_validator_finds_no_error_in_a_simulated_study(tmp_path, truths, thr
     assert {path.name.split("_")[2] for path in tmp_path.rglob("*_beh.tsv")} == {
         f"task-{task}" for task in ANSWER_TABLES
     }
-    found = validated(tmp_path / "data")
+    found = bids_issues(tmp_path / "data")
     assert [issue for issue in found if issue["severity"] == "error"] == []
     for path in tmp_path.rglob("*_events.tsv"):
         shown = table(path).query("trial_type == 'presented'")
@@ -168,7 +149,7 @@ def test_the_validator_finds_no_error_in_a_simulated_study(tmp_path, truths, thr
 def test_the_validator_would_find_one(study_on_disk):
     path = next(study_on_disk.glob("sub-01/ses-01/beh/*absolute_beh.tsv"))
     path.write_bytes(path.read_bytes().replace(b"\tmain\t", b"\twarm-up\t"))
-    errors = [issue["code"] for issue in validated(study_on_disk) if issue["severity"] == "error"]
+    errors = [issue["code"] for issue in bids_issues(study_on_disk) if issue["severity"] == "error"]
     assert "TSV_VALUE_INCORRECT_TYPE" in errors
 
 

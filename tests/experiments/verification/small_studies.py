@@ -140,13 +140,12 @@ def run_all(
     root: Path,
     study: Study,
     models: ModelSets,
-    *,
-    tasks: tuple[str, ...] = ("absolute", "relative"),
+    **circumstances: Any,
 ) -> None:
-    """Two people in each task."""
-    for task in tasks:
+    """Two people, absolute and relative."""
+    for task in ("absolute", "relative"):
         for subject in (1, 2):
-            run_one(root, study, models, task=task, subject=subject)
+            run_one(root, study, models, task=task, subject=subject, **circumstances)
 
 
 class Stopping(Person):

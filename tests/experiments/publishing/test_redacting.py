@@ -1,0 +1,152 @@
+"""Copies of data that identify nobody: verified as the original, with the same answers."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.publishing.presented import render_presentation
+from experiments.publishing.redacting import LEFT_OUT, redact
+from experiments.sessions.manifest import SessionManifest
+from experiments.sessions.session_store import SessionStore
+from experiments.sessions.stored_sessions import held_sessions
+from experiments.study.models import ModelSets
+from experiments.verification.verifying import verify_data
+from modeling import InputError
+from tests.experiments.verification.small_studies import (
+    Stopping,
+    eventful_study,
+    run_all,
+    run_one,
+    small_study,
+)
+from tests.refusals import refused
+
+TEXTURES = ("canvas", "PVC")
+SOURCES = {"full": "models/full", "simplified": "models/simplified"}
+
+
+@pytest.fixture(scope="module")
+def finished(models: ModelSets, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("study") / "data"
+    run_all(root, small_study(TEXTURES), models)
+    return root
+
+
+def everything(folder: Path) -> str:
+    paths = (path for path in sorted(folder.rglob("*")) if path.is_file())
+    return "\n".join(path.read_bytes().decode("utf-8", "replace") for path in paths)
+
+
+def test_a_copy_is_verified_and_has_the_same_answers(finished: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "copy"
+    redacted = redact(finished, copy, sources=SOURCES, described={"Authors": ["A. Author"]})
+    found = verify_data(copy)
+    assert (found.differences, len(found.sessions)) == ((), 4)
+    assert found.seal != verify_data(finished).seal
+    held, _ = held_sessions(finished)
+    assert redacted.seals == {one.files.stem: one.state.events[-1]["seal"] for one in held}
+    for pattern in ("sub-*/ses-*/beh/*_beh.tsv", "sub-*/ses-*/beh/*_events.tsv"):
+        for path in finished.glob(pattern):
+            assert (copy / path.relative_to(finished)).read_bytes() == path.read_bytes()
+    assert (copy / "participants.tsv").read_bytes() == (finished / "participants.tsv").read_bytes()
+    description = json.loads((copy / "dataset_description.json").read_text())
+    assert description["Authors"] == ["A. Author"]
+
+
+def test_no_time_of_day_pseudonym_or_platform_is_left(finished: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "copy"
+    redacted = redact(finished, copy, sources=SOURCES, described={})
+    text = everything(copy)
+    moments = re.findall(r"\d{4}-\d\d-\d\dT\d\d:\d\d", text)
+    assert set(moments) <= {f"2000-01-01T12:{minute:02d}" for minute in (0, 10)}
+    assert moments
+    held, _ = held_sessions(finished)
+    codes = {one.manifest.code for one in held}
+    assert set(redacted.secrets) == codes
+    for word in (*codes, held[0].manifest.platform):
+        assert word not in text
+        assert word in everything(finished)
+
+
+@pytest.mark.parametrize("seed", range(20, 26))
+def test_copies_of_eventful_studies_are_verified(
+    seed: int, models: ModelSets, tmp_path: Path
+) -> None:
+    """Killed and resumed sessions, withdrawals, dropouts: seals that name others still do."""
+    eventful_study(tmp_path / "data", models, seed=seed)
+    original = verify_data(tmp_path / "data")
+    if not original.sessions:
+        return
+    redact(tmp_path / "data", tmp_path / "copy", sources=SOURCES, described={})
+    found = verify_data(tmp_path / "copy")
+    assert (found.differences, found.sessions) == ((), original.sessions)
+    days = sorted((tmp_path / "data").glob("sub-*/sub-*_sessions.tsv"))
+    for table in days:
+        copied = tmp_path / "copy" / table.relative_to(tmp_path / "data")
+        assert copied.read_bytes() == table.read_bytes()
+
+
+def test_free_text_is_left_out_unless_it_is_asked_for(models: ModelSets, tmp_path: Path) -> None:
+    root = tmp_path / "data"
+    run_one(root, small_study(TEXTURES), models, respondent=Stopping(1, after=2))
+    for free_text in (False, True):
+        copy = tmp_path / f"copy-{free_text}"
+        redact(root, copy, sources=SOURCES, described={}, free_text=free_text)
+        log = next(copy.glob("sourcedata/*/*/*_log.jsonl")).read_text()
+        assert ("tired" in log) is free_text
+        assert (LEFT_OUT in log) is not free_text
+        assert verify_data(copy).differences == ()
+
+
+def test_a_running_or_damaged_session_is_not_published(models: ModelSets, tmp_path: Path) -> None:
+    root = tmp_path / "data"
+    _, manifest = run_one(root, small_study(TEXTURES), models, respondent=Stopping(1, after=2))
+    with (
+        SessionStore.resume(root, SessionManifest.load(manifest)),
+        refused(InputError, got="running"),
+    ):
+        redact(root, tmp_path / "copy", sources=SOURCES, described={})
+    log = next(root.glob("sourcedata/*/*/*_log.jsonl"))
+    log.write_bytes(log.read_bytes().replace(b'"event"', b'"evemt"', 1))
+    with refused(InputError, got="no event"):
+        redact(root, tmp_path / "copy", sources=SOURCES, described={})
+
+
+def test_a_presented_trial_renders_again_bit_for_bit(
+    finished: Path, models: ModelSets, tmp_path: Path
+) -> None:
+    redact(finished, tmp_path / "copy", sources=SOURCES, described={})
+    every = [model for of_set in models.sets.values() for model in of_set.values()]
+    rendered = 0
+    for table in sorted(finished.glob("sourcedata/*/*/*_presentations.tsv")):
+        session = table.name.removesuffix("_presentations.tsv")
+        header, *rows = (line.split("\t") for line in table.read_text().splitlines())
+        hand = table.with_name(table.name.replace("presentations", "hand")).read_text()
+        told = Counter((int(c[2]), c[0]) for c in map(str.split, hand.splitlines()[1:]))
+        readings = {which for which, count in told.items() if count > 1}
+        for cells in rows:
+            row = dict(zip(header, cells, strict=True))
+            if row["surface"] != "virtual":
+                continue
+            number = int(row["presentation"])
+            stroked = (number, row["run"]) in readings
+            if not stroked:
+                with refused(InputError, expected="readings"):
+                    render_presentation(finished, session, number, models=every)
+                continue
+            one = render_presentation(finished, session, number, models=every)
+            again = render_presentation(tmp_path / "copy", session, number, models=every)
+            assert one.tobytes() == again.tobytes()
+            assert np.abs(one).max() > 0
+            rendered += 1
+    assert rendered > 5
+    with refused(InputError, got="others"):
+        render_presentation(finished, session, number, models=[])
+    with refused(InputError, got="none"):
+        render_presentation(finished, session, 999, models=every)
