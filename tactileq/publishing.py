@@ -222,10 +222,7 @@ def _copy(place: Path, target: Path, endings: tuple[str, ...] = ("",)) -> None:
 def _write_study(path: Path, study: Study) -> None:
     import tomlkit
 
-    values = study.to_dict()
-    if study.publication is not None:
-        values["publication"] = study.publication.to_dict()
-    path.write_text(tomlkit.dumps(values), encoding="utf-8")
+    path.write_text(tomlkit.dumps(study.to_tables()), encoding="utf-8")
 
 
 def _analyze(archive: Path, options: Mapping[str, Any], analyze: Any) -> None:

@@ -191,6 +191,23 @@ STUDY = Kind(
             "calibration_days": 30,
             "measured_force": True,
             "consent": {"version": "2026-11"},
+            "publication": {
+                "description": "Ratings of three surfaces.",
+                "license": "CC-BY-4.0",
+                "ethics": "Board 7, 2026-12",
+                "funding": ["Grant 1"],
+                "keywords": ["haptics"],
+                "doi": "10.1000/182",
+                "model_licenses": {"full": "CC0-1.0"},
+                "authors": [
+                    {
+                        "family": "Carberry",
+                        "given": "Josiah",
+                        "orcid": "0000-0002-1825-0097",
+                        "affiliation": "Brown University",
+                    }
+                ],
+            },
             "questions": [
                 {
                     "name": "craft",
@@ -236,7 +253,7 @@ STUDY = Kind(
     load=Study.load,
     write=tomlkit.dumps,
     beside={},
-    again=Study.to_dict,
+    again=Study.to_tables,
 )
 KINDS = [SCENE, RECIPE, RIG, STUDY, *saved_files.KINDS]
 

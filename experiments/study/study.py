@@ -260,7 +260,11 @@ class Study(DescribedFile):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values of what fixes the experiment, so without the publication."""
-        return {name: value for name, value in super().to_dict().items() if name != "publication"}
+        return {name: value for name, value in self.to_tables().items() if name != "publication"}
+
+    def to_tables(self) -> dict[str, Any]:
+        """Plain values of the whole file."""
+        return super().to_dict()
 
     @property
     def sha256(self) -> str:

@@ -75,6 +75,7 @@ def test_every_fenced_block_is_run_by_some_test() -> None:
         "README.md": ["python"],
         "docs/models.md": ["python", "toml"],  # its recipe: tests/stimuli/sets/test_recipe.py
         "docs/your-data.md": ["python", "r"],
+        "docs/method/publishing.md": ["python"],  # test_publish_command.py
         "docs/micro-controller.md": ["sh", "c", "c"],  # C: tests/stimuli/exports
         **{f"docs/{kind}-file.md": ["toml"] for kind in ("study", "scene", "recipe")},
     }

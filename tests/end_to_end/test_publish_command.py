@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
+import re
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 import tomlkit
@@ -17,6 +20,7 @@ from tactileq.archive import seal_of_files
 from tests.experiments.verification.small_studies import run_all, small_models, small_study
 
 TEXTURES = ("canvas", "PVC")
+PAGE = Path(__file__).parents[2] / "docs/method/publishing.md"
 PUBLICATION = {
     "license": "CC-BY-4.0",
     "ethics": "Board 7, 2026-12",
@@ -83,6 +87,12 @@ def test_an_archive_stands_alone(main, here: Path, tmp_path_factory) -> None:
     assert told[2] == "models verified: 2 sets of 2"
     assert told[3].endswith("made again: the same")
     assert Study.load(archive / "study.toml").sha256 == small_study(TEXTURES).sha256
+
+    (shown,) = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), flags=re.DOTALL)
+    made: dict[str, Any] = {}
+    with contextlib.chdir(archive):
+        exec(shown, made)
+    assert made["vibration_g"].size > 0
 
     crate = ROCrate(archive)  # which refuses what is no RO-Crate
     assert {part.id for part in crate.root_dataset["hasPart"]} >= {"data/", "models/", "report/"}
