@@ -20,6 +20,7 @@ from experiments.sessions.log import read_log
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.people import Choice, Rating
 from experiments.sessions.surfaces import Surfaces
+from experiments.verification.verifying import verify_data
 from rig.desk.lock import rig_locked
 from rig.setup.rig_file import RigFile
 from stimuli.planted.textures import planted_texture
@@ -79,6 +80,8 @@ class Unlucky(Scripted):
         self._happens.get(trial.trial, lambda parts: None)(surfaces._rig.parts)
         self._feel(surfaces, 0.15)
         surfaces.present_real()
+        for scale, value in (("magnitude", 70.0), ("frequency", 30.0)):  # as the console does
+            surfaces.note("slider", scale=scale, value=value)
         return Rating(
             magnitude_similarity=70,
             frequency_similarity=30,
@@ -177,6 +180,8 @@ def test_what_fails_in_a_session_is_in_its_data_and_repeated(answered: tuple[Pat
     responses = load_responses(study / "data")  # refuses any other order of repeats
     assert f"{len(failed)} of {len(answers)} answers left out" in responses.warnings[0]
     assert not set(responses.answers["absolute"]["trial"]) & failed
+    assert verify_data(study / "data").differences == ()
+    assert f"for the checklist: {read_log(Path(f'{stem}_log.jsonl')).seal[-8:]}" in said
     check_log(read_log(Path(f"{stem}_log.jsonl")).events, failed)
     check_traces(
         pd.read_csv(f"{stem}_hand.tsv", sep="\t"),
