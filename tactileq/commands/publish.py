@@ -10,6 +10,8 @@ import typer
 
 from tactileq.own_results import check_own_results
 
+_WITH_MODELS = ("recordings", "models", "simplified")
+
 
 def publish(
     data: Annotated[Path, typer.Argument(metavar="DATA", help="Folder of the study's answers.")],
@@ -71,6 +73,9 @@ def publish(
             "own file, or change only [publication]."
         )
     options = _options_of(results, data) if results is not None else {}
+    if without and options.get("models"):
+        options |= dict.fromkeys(_WITH_MODELS)
+        print("note: the report is made without the chapters on models, which are left out.")
     publication = Publication(
         study=replace(ran, publication=stated.publication),
         data=data,

@@ -139,6 +139,19 @@ def test_what_is_not_to_be_published_stops_it(
     assert not (here / "arch").exists()
 
 
+def test_models_that_may_not_be_given_on_are_left_out(main, here: Path) -> None:
+    write_study(here, {**PUBLICATION, "model_licenses": {"full": "All rights reserved"}})
+    words = ("--study", "study.toml", "--without", "full", "--out", "arch")
+    done = main("publish", "data", *words)
+    assert done.returncode == 0, done.stderr
+    kept = {path.name for path in (here / "full").iterdir()}
+    found = [path.relative_to(here / "arch") for path in (here / "arch").rglob("*.json")]
+    assert {path.parts[:2] for path in found if path.name in kept} == {("models", "simplified")}
+    verified = main("verify", "arch")
+    assert (verified.returncode, verified.stderr) == (0, "")
+    assert "models verified: 1 set of 1" in verified.stdout
+
+
 def test_what_names_a_person_or_a_machine_stops_it(main, here: Path, monkeypatch) -> None:
     monkeypatch.setattr("platform.node", lambda: "haptics-lab-7")
     write_study(here, {**PUBLICATION, "ethics": "asked for at haptics-lab-7"})
