@@ -1,14 +1,15 @@
-"""What an archive is known by: where its parts lie, and its seal."""
+"""What an archive is known by: by its provenance, and where its parts lie."""
 
 from __future__ import annotations
 
-import hashlib
 import json
-from collections.abc import Mapping
 from pathlib import Path
 
 COMMAND = "publish"
 DATA, REPORT = "data", "report"
+SETS_OF_MODELS, STIMULI, PSYCH_DS = "models", "stimuli", "psych-ds"
+# What the report was made with beside the data.
+RECORDINGS, REPORTED = "recordings", "reported_models"
 
 
 def is_archive(folder: Path) -> bool:
@@ -20,9 +21,3 @@ def is_archive(folder: Path) -> bool:
     except (OSError, ValueError):
         return False
     return isinstance(note, dict) and note.get("command") == f"tactileq {COMMAND}"
-
-
-def seal_of_files(sha256: Mapping[str, str]) -> str:
-    """8 hexadecimal digits over the names and SHA-256 of files."""
-    lines = "".join(f"{name} {value}\n" for name, value in sorted(sha256.items()))
-    return hashlib.sha256(lines.encode()).hexdigest()[-8:]

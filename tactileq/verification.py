@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from experiments.sessions.manifest import SessionManifest
     from experiments.verification.verifying import Verified
 
 MOST_SHOWN = 20
@@ -66,3 +67,43 @@ def require_verified(
         f"expected data as their sessions stored them, got a difference{more * bool(others)}: "
         f"{first}; {advice}, or go on with --unverified REASON, which the report says."
     )
+
+
+def differing_models(name: str, place: Path, manifests: Sequence[SessionManifest]) -> Iterator[str]:
+    """A sentence for each model and simplification in a folder that is not of those presented.
+
+    Parameters
+    ----------
+    name : str
+        Of the set whose models the folder holds.
+    manifests : sequence of SessionManifest
+        Of the sessions that presented them.
+
+    Raises
+    ------
+    InputError
+        If a file of models is none.
+    """
+    from experiments.study.models import model_sha256
+    from modeling.models.loading import load_any_models
+    from modeling.perception.verdicts import ENDING, load_simplifications
+
+    found = load_any_models(place)
+    simplified = load_simplifications(place) if any(place.glob(f"*{ENDING}")) else {}
+    every = [item for one in manifests for item in one.models_sha256.items()]
+    any_set = {(texture, sha256) for texture, hashes in every for sha256 in hashes.values()}
+    for texture, sha256 in sorted({(texture, hashes[name]) for texture, hashes in every}):
+        model, verdicts = found.get(texture), simplified.get(texture)
+        if model is None or model_sha256(model) != sha256:
+            got = "none" if model is None else "another"
+            yield (
+                f"{place}: expected the {name} model of {texture} that sessions presented, got "
+                f"{got}"
+            )
+        if verdicts is not None and verdicts.model.sha256 != sha256:
+            yield f"{place}: expected the simplification of that {texture}, got another"
+        elif verdicts is not None and (texture, verdicts.full_sha256) not in any_set:
+            yield (
+                f"{place}: expected {texture} simplified from a model that was presented too, "
+                "got it from another"
+            )

@@ -6,18 +6,21 @@ import contextlib
 import io
 import re
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from experiments.sessions.manifest import SessionManifest
 
 # What says where results come from, not what they are: paths and versions may differ.
-_ORIGIN = ("provenance.json", "tables/provenance.tsv")
+_ORIGIN = ("tables/provenance.tsv",)
 _PROVENANCE = re.compile(rb'id="table-provenance">.*?</table>', re.DOTALL)
 _FOLDERS = ("recordings", "models", "simplified", "plan")
 _WRITERS = ("tactileq analyze", "tactileq demo")
 
 
-def verify_models(data: Path) -> tuple[list[str], str]:
+def verify_models(manifests: Sequence[SessionManifest]) -> tuple[list[str], str]:
     """Models and simplifications, where they lie, against the hashes that manifests hold.
 
     Scenes, which have to be compiled, are left out, and so are models that are not here any more.
@@ -34,48 +37,19 @@ def verify_models(data: Path) -> tuple[list[str], str]:
     InputError
         If a file of models is none.
     """
-    from experiments.sessions.stored_sessions import held_sessions
-    from experiments.study.models import model_sha256
     from modeling.errors import counted
-    from modeling.models.loading import load_any_models
-    from modeling.perception.verdicts import ENDING, load_simplifications
+    from tactileq.verification import differing_models
 
-    held, _ = held_sessions(data)
-    presented = {
-        (name, place, texture, hashes.get(name, ""))
-        for one in held
-        for name, place in one.manifest.model_sources.items()
-        for texture, hashes in one.manifest.models_sha256.items()
-    }
-    places = {Path(place) for _, place, *_ in presented}
-    here = {place for place in places if place.is_dir()}
-    found = {place: load_any_models(place) for place in sorted(here)}
-    simplified = {p: load_simplifications(p) for p in here if any(p.glob(f"*{ENDING}"))}
-    full = {(texture, sha256) for *_, texture, sha256 in presented}
-    differs = []
-    for name, stated, texture, sha256 in sorted(presented):
-        place = Path(stated)
-        if place not in here:
-            continue
-        model = found[place].get(texture)
-        if model is None or model_sha256(model) != sha256:
-            got = "none" if model is None else "another"
-            differs.append(
-                f"{place}: expected the {name} model of {texture} that sessions presented, "
-                f"got {got}"
-            )
-        verdicts = simplified.get(place, {}).get(texture)
-        if verdicts is not None and verdicts.model.sha256 != sha256:
-            differs.append(f"{place}: expected the simplification of that {texture}, got another")
-        elif verdicts is not None and (texture, verdicts.full_sha256) not in full:
-            differs.append(
-                f"{place}: expected {texture} simplified from a model that was presented too, "
-                "got it from another"
-            )
-    if not places:
+    of_place: dict[tuple[str, Path], list[SessionManifest]] = {}
+    for one in manifests:
+        for name, place in one.model_sources.items():
+            of_place.setdefault((name, Path(place)), []).append(one)
+    here = [key for key in sorted(of_place) if key[1].is_dir()]
+    differs = [text for key in here for text in differing_models(*key, of_place[key])]
+    if not of_place:
         return [], ""
-    absent = ", ".join(str(place) for place in sorted(places - here))
-    said = f"models verified: {counted(len(found), 'set')} of {len(places)}"
+    absent = ", ".join(str(place) for _, place in sorted(of_place.keys() - set(here)))
+    said = f"models verified: {counted(len(here), 'set')} of {len(of_place)}"
     return differs, said + (f" (not here, or a scene: {absent})" if absent else "")
 
 
@@ -118,9 +92,8 @@ def verify_results(
             "of an analysis."
         )
     require_data(note, data, results)
+    differs = list(_changed(results, note["sha256"]))
     there = _files_in(results)
-    there.pop(PROVENANCE_NAME)
-    differs = list(_changed(results, there, note["sha256"]))
     said = f"results verified: {counted(len(there), 'file')}"
     if differs:
         return differs, f"{said}, {counted(len(differs), 'difference')}; not made again"
@@ -150,37 +123,41 @@ def verify_archive(archive: Path) -> tuple[list[str], str]:
     """
     from modeling.errors import counted
     from modeling.files.documents import read_json_object
+    from modeling.files.hashes import seal_over
     from modeling.files.provenance import PROVENANCE_NAME
-    from tactileq.archive import seal_of_files
 
     note = read_json_object(archive / PROVENANCE_NAME, advice="restore the archive")
     stated: Mapping[str, str] = note.get("sha256", {})
-    there = _files_in(archive)
-    there.pop(PROVENANCE_NAME)
-    differs = list(_changed(archive, there, stated))
-    if (seal := seal_of_files(stated)) != note.get("seal"):
+    differs = list(_changed(archive, stated))
+    if (seal := seal_over(stated)) != note.get("seal"):
         sentence = f"expected the seal {seal} over its hashes, got {note.get('seal')}"
         differs.append(f"{archive / PROVENANCE_NAME}: {sentence}")
-    said = f"archive verified: {counted(len(there), 'file')}"
+    said = f"archive verified: {counted(len(stated), 'file')}"
     if differs:
         return differs, f"{said}, {counted(len(differs), 'difference')}"
     return [], f"{said} as written, seal {seal}"
 
 
-def _changed(folder: Path, there: Mapping[str, Path], stated: Mapping[str, str]) -> Iterator[str]:
+def _changed(folder: Path, stated: Mapping[str, str]) -> Iterator[str]:
     """Files that are not as their hashes say, not there, or not listed."""
-    from modeling.files.hashes import sha256_of_file
+    from modeling.files.provenance import PROVENANCE_NAME, sha256_of_files
 
+    there = sha256_of_files(folder)
+    there.pop(PROVENANCE_NAME)
     for name in sorted({*stated, *there}):
-        if name not in there or stated.get(name) != sha256_of_file(there[name]):
+        if stated.get(name) != there.get(name):
             got = "none" if name not in there else "another" if name in stated else "one"
             expected = "no such file" if got == "one" else "the file that was written"
             yield f"{folder / name}: expected {expected}, got {got}"
 
 
 def _files_in(folder: Path) -> dict[str, Path]:
-    paths = sorted(path for path in folder.rglob("*") if path.is_file())
-    return {path.relative_to(folder).as_posix(): path for path in paths}
+    """A folder's files but its provenance, by their paths in it."""
+    from modeling.files.provenance import PROVENANCE_NAME
+
+    paths = (path for path in folder.rglob("*") if path.is_file())
+    files = {path.relative_to(folder).as_posix(): path for path in paths}
+    return {name: path for name, path in files.items() if name != PROVENANCE_NAME}
 
 
 def require_data(note: Mapping[str, Any], data: Path, results: Path) -> None:

@@ -86,7 +86,7 @@ def redact(
             f"expected sessions that have ended, got {running[0]}, which is running; publish when "
             "it has ended."
         )
-    lines = read_bytes(Roster(data_folder).path, "the roster").splitlines()
+    *lines, _ = read_bytes(Roster(data_folder).path, "the roster").split(b"\n")
     roster = [object_of(line) for line in lines]
     begins = dict(_beginnings(held))
     change = _Change(sources=sources, free_text=free_text)
@@ -147,6 +147,7 @@ class _Change:
     free_text: bool
 
     def manifest(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Values of a manifest, or those of them that changed."""
         changed = dict(values)
         if "subject" in changed:
             changed["code"] = published_code(changed["subject"])
@@ -159,6 +160,7 @@ class _Change:
         return changed
 
     def event(self, event: Event) -> dict[str, Any]:
+        """An event of a log, but for its time, its hashes and its seal."""
         changed = dict(event)
         name = _TEXT.get(event["event"], "")
         if isinstance(changed.get(name), str) and event.get("by") not in _BY_PROGRAM:

@@ -19,7 +19,7 @@ from modeling.files.places import locked
 BIDS_VERSION = "1.10.0"
 DESCRIPTION_NAME = "dataset_description.json"
 # What may differ for a stated reason; people and simulations never share a folder.
-_MAY_DIFFER = {"StudySHA256": "study", "ModelsSHA256": "models", "Pilot": "pilot"}
+MAY_DIFFER = {"StudySHA256": "study", "ModelsSHA256": "models", "Pilot": "pilot"}
 
 
 def claim_data_set(root: Path, manifest: SessionManifest, *, overrides: Overrides) -> None:
@@ -97,7 +97,7 @@ def _check(
                 f"{shown(found.get(key))}; choose another data folder for these sessions, since "
                 "people and simulations never share one."
             )
-    for key, what in _MAY_DIFFER.items():
+    for key, what in MAY_DIFFER.items():
         if found.get(key) != wanted[key]:
             overrides.allow(
                 what,

@@ -5,7 +5,6 @@ docs/method/verification.md
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,9 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from experiments.sessions.bids import differing_tables
-from experiments.sessions.data_set import DESCRIPTION_NAME, describe_data_set
+from experiments.sessions.data_set import DESCRIPTION_NAME, MAY_DIFFER, describe_data_set
 from experiments.sessions.files import SessionFiles, require_data_folder, sessions_in
 from experiments.sessions.log import plain
+from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.order import draw_session
 from experiments.sessions.roster import Roster
 from experiments.sessions.stored_sessions import Damaged, StoredSession, held_sessions
@@ -28,11 +28,9 @@ from experiments.verification.sidecars import check_sidecars
 from modeling import InputError
 from modeling.errors import counted, shown
 from modeling.files.documents import read_json_object
-from modeling.files.hashes import sha256_of_paths
+from modeling.files.hashes import seal_over, sha256_of_paths
 
 _OF_A_SESSION = re.compile(r"(sub-\d+)_ses-\d+_task-.*")
-# What a session may have otherwise than the description, for a recorded reason.
-_OVERRIDDEN = (("StudySHA256", "study"), ("ModelsSHA256", "models"), ("Pilot", "pilot"))
 # Of the description: what the first session fixes. The rest is for people to fill in.
 _FIXED = (
     "Simulated",
@@ -63,6 +61,8 @@ class Verified:
         8 hexadecimal digits over the seals of all logs.
     with_source : bool
         Whether there are logs; without, only hashes in sidecars could be compared.
+    manifests : tuple of SessionManifest
+        Of all sessions that can be read.
     """
 
     differences: tuple[Difference, ...]
@@ -71,6 +71,7 @@ class Verified:
     unsealed: tuple[str, ...] = ()
     seal: str = ""
     with_source: bool = True
+    manifests: tuple[SessionManifest, ...] = ()
 
     def without(self, participants: Collection[str]) -> Verified:
         """Without what is about these participants (sub-01) alone."""
@@ -134,19 +135,15 @@ def verify_data(data_folder: str | Path) -> Verified:
         for one, sentence in copied(ended)
     ]
     seals = {one.files.stem: _seal(one) for one in ended}
+    sealed = {stem: seal for stem, seal in seals.items() if seal}
     return Verified(
         differences=tuple(found),
         sessions=(*seals, *(one.files.stem for one in damaged)),
         running=tuple(one.files.stem for one in held if one.running),
         unsealed=tuple(stem for stem, seal in seals.items() if not seal),
-        seal=seal_of_study(seals),
+        seal=seal_over(sealed) if sealed else "",
+        manifests=tuple(one.manifest for one in held),
     )
-
-
-def seal_of_study(seals: Mapping[str, str]) -> str:
-    """8 hexadecimal digits over sessions and the seals of their logs; empty without seals."""
-    lines = "".join(f"{stem} {seal}\n" for stem, seal in sorted(seals.items()) if seal)
-    return hashlib.sha256(lines.encode()).hexdigest()[-8:] if lines else ""
 
 
 def _published(root: Path) -> Verified:
@@ -367,7 +364,7 @@ def _description(root: Path, held: Sequence[StoredSession]) -> Iterator[Differen
         return
     for one, made in described:
         allowed = {record["what"] for record in one.manifest.overrides}
-        for name, what in _OVERRIDDEN:
+        for name, what in MAY_DIFFER.items():
             if made[name] != found[name] and what not in allowed:
                 yield Difference(
                     place=one.files.manifest.relative_to(root).as_posix(),

@@ -17,6 +17,11 @@ def sha256_of(text: str) -> str:
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
+def seal_over(values: Mapping[str, str]) -> str:
+    """8 hexadecimal digits over named values, such as hashes of files, whatever their order."""
+    return sha256_of("".join(f"{name} {value}\n" for name, value in sorted(values.items())))[-8:]
+
+
 def sha256_of_values(values: Mapping[str, Any]) -> str:
     """SHA-256 of plain values, whatever the order of their names."""
     return sha256_of(json.dumps(values, sort_keys=True, ensure_ascii=False))

@@ -48,25 +48,23 @@ def publish(
     from modeling import InputError
     from modeling.errors import counted
     from modeling.files.folders import replace_folder
-    from modeling.files.hashes import sha256_of_paths
+    from modeling.files.hashes import seal_over, sha256_of_paths
     from modeling.files.provenance import provenance_of, seal_folder, sha256_of_files
-    from tactileq.archive import COMMAND, DATA, seal_of_files
+    from tactileq.archive import COMMAND, DATA
+    from tactileq.archive_metadata import Publication
     from tactileq.bids_validator import bids_issues, said_of
     from tactileq.commands.analyze import analyze
-    from tactileq.publishing import (
-        Publication,
-        assemble,
-        check_publishable,
-        checked_models,
-    )
+    from tactileq.publishing import assemble, check_publishable, checked_models
     from tactileq.verification import require_verified
 
     seen = check_own_results(out, COMMAND)
     stated = Study.load(study)
-    places, absent = checked_models(data, _places(models), without=without or ())
+    found = require_verified(data, without=(), unverified=None)
+    if not found.manifests:
+        raise InputError(f"expected sessions in {data}, got none; name a folder with sourcedata.")
+    places, absent = checked_models(found.manifests, _places(models), without=without or ())
     check_publishable(stated, models=places)
-    require_verified(data, without=(), unverified=None)
-    ran = _study_of(data)
+    ran = Study.from_dict(found.manifests[0].study)
     if ran.sha256 != stated.sha256:
         raise InputError(
             f"expected the study that {data} was run with, got another one in {study}; name its "
@@ -83,6 +81,7 @@ def publish(
         stimuli=stimuli,
         options=options,
         free_text=free_text,
+        simulated=found.manifests[0].simulated_participant,
     )
     (inputs,) = sha256_of_paths([data]).values()
     with replace_folder(out, seen) as fresh:
@@ -95,8 +94,7 @@ def publish(
             )
         settings = {"free_text": free_text, "without": list(without or ())}
         provenance = provenance_of(COMMAND, settings, inputs={"data": inputs})
-        hashes = sha256_of_files(fresh)
-        seal = seal_of_files(hashes)
+        seal = seal_over(sha256_of_files(fresh))
         seal_folder(fresh, {**provenance, **told, "seal": seal})
     for name in absent:
         print(f"note: the {name} models are not here, and not in the archive.")
@@ -112,20 +110,6 @@ def _places(models: list[str] | None) -> dict[str, Path]:
             raise ValueError(f"expected --models SET=FOLDER, got {text!r}; write both.")
         places[name] = Path(folder)
     return places
-
-
-def _study_of(data: Path) -> Any:
-    """The study that the sessions were run with."""
-    from experiments.sessions.stored_sessions import held_sessions
-    from experiments.study.study import Study
-    from modeling import InputError
-
-    held, damaged = held_sessions(data)
-    if damaged:
-        raise InputError(damaged[0].sentence)
-    if not held:
-        raise InputError(f"expected sessions in {data}, got none; name a folder with sourcedata.")
-    return Study.from_dict(held[0].manifest.study)
 
 
 def _options_of(results: Path, data: Path) -> dict[str, Any]:

@@ -44,7 +44,7 @@ def verify(
         place = contextlib.nullcontext()
     with place:
         found = verify_data(data)
-        checks.append(verify_models(data))
+        checks.append(verify_models(found.manifests))
         if results is not None:
             checks.append(verify_results(data, results, analyze=analyze))
     print(found.summary)

@@ -16,8 +16,13 @@ from rocrate.rocrate import ROCrate
 
 from experiments.sessions.stored_sessions import held_sessions
 from experiments.study.study import Study
-from tactileq.archive import seal_of_files
-from tests.experiments.verification.small_studies import run_all, small_models, small_study
+from modeling.files.hashes import seal_over
+from tests.experiments.verification.small_studies import (
+    run_all,
+    simplified_texture,
+    small_models,
+    small_study,
+)
 
 TEXTURES = ("canvas", "PVC")
 PAGE = Path(__file__).parents[2] / "docs/method/publishing.md"
@@ -45,6 +50,8 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / name).mkdir()
         for texture, model in of_set.items():
             model.save(folder / name / f"{texture}.json")
+    for texture in TEXTURES:
+        simplified_texture(texture).save(folder / f"simplified/{texture}_simplification.json")
     run_all(folder / "data", study, models, sources={name: name for name in models.sets})
     write_study(folder, PUBLICATION)
     return folder
@@ -68,7 +75,7 @@ def test_an_archive_stands_alone(main, here: Path, tmp_path_factory) -> None:
     assert done.returncode == 0, done.stderr
     note = json.loads((here / "arch/provenance.json").read_text())
     assert f"seal of the archive: {note['seal']}" in done.stdout
-    assert note["seal"] == seal_of_files(note["sha256"])
+    assert note["seal"] == seal_over(note["sha256"])
     held, _ = held_sessions(here / "data")
     seals = {one.files.stem: one.state.events[-1]["seal"] for one in held}
     assert note["original_seals"] == seals

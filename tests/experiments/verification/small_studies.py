@@ -31,7 +31,7 @@ from experiments.study.questions import Question
 from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import task_named
-from modeling import Threshold, simplify
+from modeling import Simplification, Threshold, simplify
 from rig.twin import SimulatedRig
 from stimuli.planted.textures import planted_texture
 from tests.experiments.scripted import Scripted
@@ -81,12 +81,16 @@ class Person(Scripted):
         return Choice(button=surfaces.last, response_time_s=taken_s)
 
 
+def simplified_texture(texture: str) -> Simplification:
+    """What the paper's rule leaves of a planted texture."""
+    threshold = Threshold.shipped("codec")
+    return simplify(planted_texture(texture), threshold, criterion="paper-fft", margin_db=15.0)
+
+
 def small_models(textures: tuple[str, ...]) -> ModelSets:
     """Planted textures, and what the paper's rule leaves of them."""
     full = {texture: planted_texture(texture) for texture in textures}
-    rule = {"criterion": "paper-fft", "margin_db": 15.0}
-    threshold = Threshold.shipped("codec")
-    simplified = {name: simplify(model, threshold, **rule).model for name, model in full.items()}
+    simplified = {texture: simplified_texture(texture).model for texture in textures}
     return ModelSets(sets={"full": full, "simplified": simplified})
 
 
