@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from math import sqrt
+from math import nan, sqrt
 from typing import Literal, Protocol
 
 import numpy as np
@@ -160,6 +160,12 @@ class HandRows:
         Number of the presentation, 0 where there was none.
     force_assumed : (n,) ndarray of bool
         Where no device measured the force.
+    x_mm, y_mm, depth_mm : (n,) ndarray
+        Position in the frame of a force device's wall, and how far below it; NaN without one.
+    force_commanded : (n,) ndarray of bool
+        Where the force is what a device was told to push with, not what a sensor said.
+    beyond_edge : (n,) ndarray of bool
+        Below the height of a wall that is shown, but beside it.
     """
 
     time_s: Floats
@@ -168,6 +174,21 @@ class HandRows:
     surface: NDArray[np.int_]
     presentation: NDArray[np.int_]
     force_assumed: NDArray[np.bool_]
+    x_mm: Floats = field(default_factory=lambda: np.zeros(0))
+    y_mm: Floats = field(default_factory=lambda: np.zeros(0))
+    depth_mm: Floats = field(default_factory=lambda: np.zeros(0))
+    force_commanded: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    beyond_edge: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    def __post_init__(self) -> None:
+        """What is not given is not known of any row."""
+        rows = self.time_s.size
+        for name in ("x_mm", "y_mm", "depth_mm"):
+            if getattr(self, name).size != rows:
+                object.__setattr__(self, name, np.full(rows, nan))
+        for name in ("force_commanded", "beyond_edge"):
+            if getattr(self, name).size != rows:
+                object.__setattr__(self, name, np.zeros(rows, dtype=bool))
 
     def __len__(self) -> int:
         return self.time_s.size
@@ -175,7 +196,9 @@ class HandRows:
     @staticmethod
     def joined(parts: Sequence[HandRows]) -> HandRows:
         """One after the other; no rows for no parts."""
-        kinds = {"surface": np.int_, "presentation": np.int_, "force_assumed": np.bool_}
+        kinds = {"surface": np.int_, "presentation": np.int_} | dict.fromkeys(
+            ("force_assumed", "force_commanded", "beyond_edge"), np.bool_
+        )
         columns = {
             name: np.concatenate(
                 [np.zeros(0, dtype=kinds.get(name, np.float64))]
@@ -295,6 +318,13 @@ class TextureRig(Protocol):
 
     def close(self) -> None:
         """Fall silent and stop everything; harmless when closed already."""
+
+    def arm(self) -> None:
+        """Let a force device push from now on, also after a fault; nothing of a rig without one.
+
+        Only where people have confirmed it: no rig arms itself. A device that cannot be armed
+        reports a fault.
+        """
 
     def now_s(self) -> float:
         """The rig's clock."""

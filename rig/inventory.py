@@ -19,9 +19,12 @@ from modeling.errors import InputError, counted
 from modeling.extras import Extra, MissingExtra, install_advice
 from modeling.files.provenance import version_of
 from modeling.rendering.compiled import is_compiled
+from rig.force.dhd import UNTESTED, DhdLibrary
+from rig.force.wall import largest_stiffness_n_per_mm
 from rig.hand.devices import connected_devices
 from rig.hand.sample import ConnectedDevice
 from rig.live.memory import compiled
+from rig.setup.force_sections import ForceSection
 from rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
 from rig.sound.devices import (
     Direction,
@@ -116,6 +119,7 @@ def of_rig(file: Path, *, today: datetime.date) -> tuple[RigFile | None, list[Fi
         _sound(rig),
         _limits(rig),
         _hand(rig),
+        *([] if rig.force is None else _force(rig, rig.force)),
         _accelerometer(rig),
         _calibration(rig, today),
         _latency(rig, today),
@@ -189,10 +193,34 @@ def _limits(rig: RigFile) -> Finding:
     )
 
 
+def _force(rig: RigFile, force: ForceSection) -> list[Finding]:
+    """The force device and its library, and what a wall on it may be."""
+    largest = largest_stiffness_n_per_mm(
+        rate_hz=force.rate_hz,
+        damping_n_s_per_m=force.damping.value,
+        delay_s=1e-3 * force.delay_ms.value,
+    )
+    stable = f"passive up to {largest:.3g} N/mm"
+    if force.damping.assumed or force.delay_ms.assumed:
+        stable += ", on assumed damping or delay"
+    found = [Finding("wall", f"{stable}; force is commanded, not sensed", "note")]
+    if rig.pose is None:
+        sentence = "expected a measured pose, got none; measure it (tactileq rig pose)."
+        found.append(Finding("pose", sentence, "note"))
+    try:
+        library = DhdLibrary(force.library)
+        library.find(force.serial)
+    except InputError as error:
+        return [Finding("force device", str(error), "fault"), *found]
+    version = ".".join(map(str, library.version[:2]))
+    tested = "simulated" if library.simulated else UNTESTED
+    return [Finding("force device", f"libdhd {version}: {tested}", "note"), *found]
+
+
 def _hand(rig: RigFile) -> Finding:
     hand = rig.hand
     sentence = f"{hand.kind}{f', {hand.device}' if hand.device else ''}"
-    if hand.kind in ("scripted", "window"):
+    if hand.kind in ("scripted", "window", "force"):
         return Finding("hand", sentence)
     if hand.device is not None and hand.device.startswith("/"):
         return _present("hand", Path(hand.device), sentence, group=GROUPS[hand.kind])

@@ -95,6 +95,9 @@ class SimulatedRig:
         """Fall silent."""
         self.silence()
 
+    def arm(self) -> None:
+        """Nothing: it does not push."""
+
     def now_s(self) -> float:
         """How far the readings have moved the hand on."""
         return self._steps * STEP_S

@@ -3,7 +3,8 @@
 `modeling.rendering._kernel` is the rendering kernel, `_kernel_single` the same in single precision,
 `_many` renders many streams side by side, `modeling.estimation._slopes` is what the fit of layers
 spends its time on, `benches.rendering._rivals` is what the bench compares,
-`rig.live._live` is the memory that processes of a rig share and the callback that plays.
+`rig.live._live` is the memory that processes of a rig share, the callback that plays and the servo
+of a force device, `rig.force._standin` a stand-in for the library of its maker.
 """
 
 from __future__ import annotations
@@ -24,6 +25,11 @@ SOUNDS = ROOT / "benches" / "rendering" / "sounds.h"
 PLAYER = ROOT / "modeling" / "rendering" / "player.h"
 LIVE = ROOT / "rig" / "live" / "live.h"
 SOUND = ROOT / "rig" / "live" / "sound.h"
+BACKEND = ROOT / "rig" / "force" / "backend.h"
+FORCE = ROOT / "rig" / "force" / "force.h"
+STROKE = ROOT / "rig" / "force" / "stroke.h"
+SERVO = ROOT / "rig" / "force" / "servo.h"
+STANDIN = ROOT / "rig" / "force" / "standin.h"
 # For GCC and Clang. A multiplication contracted with an addition would round otherwise than Python.
 COMPILER_ARGUMENTS = ["-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno"]
 # No result changes, but both ways of a choice may be computed, which vectors do.
@@ -92,21 +98,30 @@ def live_binding() -> FFI:
         "\n".join(
             (
                 "typedef double tq_real; static const int TQ_KEPT, TQ_KEPT_DOUBLED, TQ_LANES;",
-                "static const int TQ_RING, TQ_ROWS;",
+                "static const int TQ_RING, TQ_ROWS, TQ_STATES, TQ_EVENTS, TQ_CAUSES;",
+                "static const int TQ_WORD_ASKED, TQ_WORD_WALL, TQ_WORD_PRESS, TQ_WORD_TICK;",
+                "static const int TQ_WORD_TICKS, TQ_WORD_STATE, TQ_WORD_FORCE, TQ_WORD_DEPTH;",
+                "static const int TQ_WORD_WATCHDOG;",
+                "#define TQ_TRACK 256",
                 "typedef struct tq_live tq_live; typedef struct tq_sound tq_sound;",
+                "typedef struct tq_servo tq_servo;",
                 declarations(KERNEL),
                 declarations(LATTICE),
                 voice[0],
                 declarations(LIVE),
                 declarations(SOUND),
+                declarations(BACKEND),
+                declarations(FORCE),
+                declarations(STROKE),
+                declarations(SERVO),
             )
         )
     )
-    headers = (KERNEL, LATTICE, PLAYER, LIVE, SOUND)
+    headers = (KERNEL, LATTICE, PLAYER, LIVE, SOUND, BACKEND, FORCE, STROKE, SERVO)
     builder.set_source(
         "rig.live._live",
-        f'#include "{SOUND.name}"',
-        include_dirs=[str(PLAYER.parent), str(SOUND.parent)],
+        f'#include "{SOUND.name}"\n#include "{SERVO.name}"',
+        include_dirs=[str(PLAYER.parent), str(SOUND.parent), str(SERVO.parent)],
         depends=[str(header) for header in headers],
         extra_compile_args=COMPILER_ARGUMENTS,
         optional=True,  # no compiler: everything but a live rig works
@@ -114,4 +129,23 @@ def live_binding() -> FFI:
     return builder
 
 
+def standin_binding() -> FFI:
+    """The builder of `rig.force._standin`: Force Dimension's functions without a device.
+
+    It is loaded as the maker's is, and its further functions say what the device does and suffers.
+    """
+    builder = FFI()
+    builder.cdef(declarations(STANDIN))
+    builder.set_source(
+        "rig.force._standin",
+        f'#include "{STANDIN.name}"',
+        include_dirs=[str(STANDIN.parent), str(LIVE.parent)],
+        depends=[str(STANDIN), str(LIVE)],
+        extra_compile_args=COMPILER_ARGUMENTS,
+        optional=True,
+    )
+    return builder
+
+
 live = live_binding()
+standin = standin_binding()

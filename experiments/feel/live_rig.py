@@ -11,6 +11,8 @@ from experiments.feel.rigs import NO_HAND, HandNow, OutputNow
 from modeling import InputError
 from modeling.models.loading import Layered
 from modeling.rendering.plan import RenderCounters
+from rig.force.hand import ForceHand
+from rig.force.wall import Wall
 from rig.hand.reader import HandReader
 from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, OLDEST_READING_S, Live, now_s
 from rig.sound.output import SoundOutput
@@ -34,6 +36,8 @@ class LiveRig:
         What of the rig is simulated, assumed or missing.
     masking_level : float
         RMS of the noise, share of full scale.
+    wall : Wall, optional
+        What a force device renders under all of them.
     """
 
     def __init__(
@@ -45,10 +49,12 @@ class LiveRig:
         pointed: bool,
         notes: Iterable[str],
         masking_level: float = MASKING_LEVEL,
+        wall: Wall | None = None,
     ) -> None:
         self._live, self._hand, self._sound = live, hand, sound
         self._pointed, self._masking_level = pointed, masking_level
         self._notes = tuple(notes)
+        self._wall = wall
         self._faults: list[str] = []
         self._model: Layered | None = None
         self._seen = live.blocks_written
@@ -68,12 +74,24 @@ class LiveRig:
             return
         try:
             self._sound.play(model)
+            if isinstance(self._hand, ForceHand) and self._wall is not None:
+                self._hand.show(self._wall)
         except (SoundLost, InputError) as fault:
             self._faults.append(str(fault))
+
+    def arm(self) -> None:
+        """Let a force device push; `take_faults` reports a fault."""
+        if isinstance(self._hand, ForceHand):
+            try:
+                self._hand.arm()
+            except InputError as fault:
+                self._faults.append(str(fault))
 
     def silence(self) -> None:
         """Render nothing."""
         self._model = None
+        if isinstance(self._hand, ForceHand):
+            self._hand.hide()
         if self._sound is not None:
             self._sound.silence()
 
@@ -105,6 +123,7 @@ class LiveRig:
             speed_mm_s=float(reading["speed_mm_s"]),
             force_n=float(reading["force_n"]) if touches else 0.0,
             force_assumed=bool(reading["flags"] & FORCE_ASSUMED),
+            depth_mm=float(reading["depth_mm"]),
         )
 
     def output(self) -> OutputNow | None:

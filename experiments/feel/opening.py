@@ -12,7 +12,9 @@ from experiments.feel.view import short
 from modeling import Compensation, InputError, Limits, Vibrator, compensation_for
 from rig.desk.checks import HIGHEST_LATENCY_MS
 from rig.desk.lock import rig_locked
-from rig.desk.parts import hand_settings, sound_output
+from rig.desk.parts import hand_reader, sound_output
+from rig.desk.walls import Walls, check_walls, usual_stiffness_n_per_mm
+from rig.force.wall import Wall
 from rig.hand.reader import HandReader
 from rig.hand.settings import HandSettings
 from rig.live.memory import Live
@@ -41,22 +43,29 @@ def desk(path: Path) -> Iterator[LiveRig]:
         For a rig file that is none, a part that is not there, or a rig in use.
     """
     rig = RigFile.load(path)
+    wall = None
+    if rig.force is not None:
+        wall = Wall(stiffness_n_per_mm=usual_stiffness_n_per_mm(rig), width_mm=100, length_mm=100)
+        check_walls(rig, Walls(usual=wall))
     with ExitStack() as opened:
         opened.enter_context(rig_locked(rig.rig.name))
         live = opened.enter_context(Live.create())
-        hand = opened.enter_context(HandReader(live, hand_settings(rig)))
+        hand = opened.enter_context(hand_reader(rig, live))
         try:
             sound = opened.enter_context(sound_output(rig, live))
         except SoundLost as lost:
             raise InputError(str(lost)) from None
-        yield LiveRig(
+        felt = LiveRig(
             live,
             hand,
             sound,
             pointed=rig.hand.kind == "window",
             masking_level=rig.sound.masking_level or MASKING_LEVEL,
             notes=notes_on(rig),
+            wall=wall,
         )
+        felt.arm()
+        yield felt
 
 
 def notes_on(rig: RigFile) -> tuple[str, ...]:
@@ -65,6 +74,8 @@ def notes_on(rig: RigFile) -> tuple[str, ...]:
     late = rig.latency is not None and rig.latency.p95_ms.value > HIGHEST_LATENCY_MS
     notes = {
         "simulated hand": rig.hand.kind == "scripted",
+        "simulated force device": rig.force is not None and rig.force.simulated,
+        "force commanded, not sensed": rig.force is not None,
         "simulated sound card": rig.sound.simulated,
         "force assumed": not rig.hand.measures_force,
         "level not calibrated": any(figure.assumed for figure in scale),

@@ -20,12 +20,15 @@ class HandNow:
         Whether a reading came within the last 100 ms; else the rig counts the hand as lifted off.
     force_assumed : bool
         Whether nothing measures the force.
+    depth_mm : float
+        Below the wall of a force device; NaN without one. The force is then commanded.
     """
 
     speed_mm_s: float
     force_n: float
     there: bool = True
     force_assumed: bool = False
+    depth_mm: float = float("nan")
 
 
 NO_HAND = HandNow(speed_mm_s=0.0, force_n=0.0, there=False)
@@ -63,6 +66,9 @@ class FeltRig(Protocol):
 
     def present_model(self, model: Layered) -> object:
         """Render this model under the hand, from now on."""
+
+    def arm(self) -> None:
+        """Let a force device push from now on, also after a fault; nothing of a rig without one."""
 
     def silence(self) -> object:
         """Render nothing."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import isnan
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -226,7 +227,8 @@ def hand_words(hand: HandNow) -> str:
     if not hand.there:
         return "no hand"
     assumed = " (assumed)" if hand.force_assumed else ""
-    return f"{abs(hand.speed_mm_s):.0f} mm/s   {hand.force_n:.1f} N{assumed}"
+    wall = "" if isnan(hand.depth_mm) else f" commanded   {max(hand.depth_mm, 0.0):.1f} mm deep"
+    return f"{abs(hand.speed_mm_s):.0f} mm/s   {hand.force_n:.1f} N{assumed}{wall}"
 
 
 def output_words(output: OutputNow | None, now: ModelNow, *, playing: bool) -> tuple[str, ...]:

@@ -69,10 +69,11 @@ class Visit:
         self.rig.silence()
 
     def stop_or_play(self) -> None:
-        """Stop, or continue after a stop."""
+        """Stop, or continue after a stop, which also arms a force device that has let go."""
         if self.playing:
             self.stop()
         else:
+            self.rig.arm()
             self.play()
 
     def switch_masking(self) -> None:

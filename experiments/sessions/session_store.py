@@ -31,6 +31,7 @@ from experiments.sessions.tables import GrowingTable
 from experiments.sessions.traces import (
     HAND_COLUMNS,
     PRESENTATION_COLUMNS,
+    WALL_COLUMNS,
     hand_lines,
     pen_file,
     presentation_table,
@@ -81,7 +82,8 @@ class SessionStore:
             if log.cut:  # half a line of a process that was killed
                 os.ftruncate(handle, os.fstat(handle).st_size - len(log.cut))
             self._cut = log.cut
-            self._hand = self._table("hand", HAND_COLUMNS)
+            self._walls = "Walls" in manifest.rig
+            self._hand = self._table("hand", HAND_COLUMNS + WALL_COLUMNS * self._walls)
             self._shown = self._table("presentations", PRESENTATION_COLUMNS)
         except BaseException:
             self._close_tables()
@@ -253,7 +255,7 @@ class SessionStore:
         self._shown.extend(
             presentation_table(trial, presentations, run=self.run, rows=rows, faults=faults)
         )
-        self._hand.extend_lines(hand_lines(trial, rows, run=self.run))
+        self._hand.extend_lines(hand_lines(trial, rows, run=self.run, walls=self._walls))
 
     def acceleration(self, trial: int, pieces: Sequence[Acceleration]) -> None:
         """See `Store.acceleration`: a WAV file in g for each piece."""

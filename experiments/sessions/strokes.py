@@ -9,9 +9,10 @@ from math import nan
 import numpy as np
 
 from modeling.arrays import Floats
-from rig.interface import HandRows, PresentationRecord
+from rig.interface import SURFACES, HandRows, PresentationRecord
 
 MOSTLY = 0.5
+OFTEN = 0.1
 HOW = ("too_slow", "too_fast", "too_light", "too_hard")
 
 
@@ -69,6 +70,14 @@ def advice_on(outside: Outside | None) -> tuple[str, int] | None:
         return None
     worst = max(HOW, key=lambda name: float(np.nan_to_num(getattr(outside, name))))
     return f"strokes.{worst}", round(100 * outside.outside)
+
+
+def beyond_edge(rows: HandRows) -> float:
+    """Share (0 … 1) of the time below the height of a virtual wall that was spent beside it."""
+    on_virtual = rows.surface == SURFACES.index("virtual")
+    with np.errstate(invalid="ignore"):
+        below = on_virtual & (rows.depth_mm > 0)
+    return float(np.mean(rows.beyond_edge[below])) if below.any() else 0.0
 
 
 def _beyond(rows: HandRows, record: PresentationRecord) -> Floats:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from experiments.sessions.traces import HAND_COLUMNS, PRESENTATION_COLUMNS
+from experiments.sessions.traces import HAND_COLUMNS, PRESENTATION_COLUMNS, WALL_COLUMNS
 from modeling import InputError
 from modeling.errors import counted
 from modeling.files.columns import Column, Columns, names
@@ -39,8 +39,13 @@ class TraceRows:
 
 
 def hand_rows(path: Path, *, runs: Collection[int]) -> TraceRows:
-    """The readings of the hand in these starts of the session; none where there is no file."""
-    return _rows(path, HAND_COLUMNS, runs=runs)
+    """The readings of the hand in these starts of the session; none where there is no file.
+
+    The cells of HAND_COLUMNS; what a session on a force device has behind them is checked, too.
+    """
+    found = _rows(path, HAND_COLUMNS, runs=runs, further=WALL_COLUMNS)
+    usual = len(HAND_COLUMNS)
+    return replace(found, rows=[b"\t".join(row.split(b"\t", usual)[:usual]) for row in found.rows])
 
 
 def presentation_rows(
@@ -54,7 +59,9 @@ def presentation_rows(
     return [dict(zip(header, row, strict=True)) for row in shown], found.damaged
 
 
-def _rows(path: Path, columns: Columns, *, runs: Collection[int]) -> TraceRows:
+def _rows(
+    path: Path, columns: Columns, *, runs: Collection[int], further: Columns = ()
+) -> TraceRows:
     if not path.is_file():
         return TraceRows()
     try:
@@ -66,6 +73,8 @@ def _rows(path: Path, columns: Columns, *, runs: Collection[int]) -> TraceRows:
     if not lines:
         return TraceRows()
     header, *others = lines
+    if header == "\t".join(names((*columns, *further))).encode():
+        columns = (*columns, *further)
     if header != "\t".join(names(columns)).encode():
         return TraceRows(damaged=(f"line 1 of {path.name}, without which no other can be read",))
     row = re.compile("\t".join(f"(?:{_cell(column)})" for column in columns).encode())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import repeat
 from math import inf
 
 import numpy as np
@@ -66,6 +67,31 @@ HAND_COLUMNS = (
         description="Whether the force was not measured but assumed",
         levels={"1": "assumed", "0": "measured, or n/a"},
         required=True,
+    ),
+)
+# Further columns of a session on a force device.
+WALL_COLUMNS = (
+    *(
+        Column(name, unit="mm", description=what, limits=_NUMBER, optional=True)
+        for name, what in (
+            ("x_mm", "Position along the first axis of the wall; n/a where nothing measures it"),
+            ("y_mm", "Position along the second axis of the wall"),
+            ("depth_mm", "How far below the height of the wall, whether it is shown or not"),
+        )
+    ),
+    Column(
+        "force_commanded",
+        description="Whether the force is what a device was told to push with, not sensed",
+        levels={"1": "commanded", "0": "not"},
+        required=True,
+        optional=True,
+    ),
+    Column(
+        "beyond_edge",
+        description="Whether the tool was below the height of a wall that was shown, but beside it",
+        levels={"1": "beside it", "0": "not"},
+        required=True,
+        optional=True,
     ),
 )
 _OUTSIDE = {
@@ -134,31 +160,53 @@ PRESENTATION_COLUMNS = (
 )
 
 
-def hand_lines(trial: int, rows: HandRows, *, run: int) -> Iterator[str]:
+def hand_lines(trial: int, rows: HandRows, *, run: int, walls: bool = False) -> Iterator[str]:
     """The rows of a trial's history in one start of the session, as lines of the table.
 
     Written directly, since there are up to thousands in a second.
+
+    Parameters
+    ----------
+    walls : bool
+        Whether with WALL_COLUMNS.
 
     Raises
     ------
     InputError
         For an infinite number.
     """
-    measured = {name: getattr(rows, name) for name in ("time_s", "speed_mm_s", "force_n")}
+    positions = ("x_mm", "y_mm", "depth_mm") if walls else ()
+    measured = {
+        name: getattr(rows, name) for name in ("time_s", "speed_mm_s", "force_n", *positions)
+    }
     for name, values in measured.items():
         if np.isinf(values).any():
             raise InputError(f"expected a finite {name} of the hand, got infinity; present again.")
     columns = zip(
         rows.presentation.tolist(),
-        *(values.tolist() for values in measured.values()),
+        *(measured[name].tolist() for name in ("time_s", "speed_mm_s", "force_n")),
         rows.surface.tolist(),
         rows.force_assumed.tolist(),
+        _wall_cells(rows) if walls else repeat("", len(rows)),
         strict=True,
     )
-    for presentation, time_s, speed_mm_s, force_n, surface, assumed in columns:
+    for presentation, time_s, speed_mm_s, force_n, surface, assumed, cells in columns:
         yield (
             f"{run}\t{trial}\t{presentation}\t{_number(time_s, 6)}\t{_number(speed_mm_s, 4)}\t"
-            f"{_number(force_n, 5)}\t{SURFACES[surface]}\t{int(assumed)}\n"
+            f"{_number(force_n, 5)}\t{SURFACES[surface]}\t{int(assumed)}{cells}\n"
+        )
+
+
+def _wall_cells(rows: HandRows) -> Iterator[str]:
+    """The cells of WALL_COLUMNS, each after a tab."""
+    positions = (rows.x_mm, rows.y_mm, rows.depth_mm)
+    flags = (rows.force_commanded, rows.beyond_edge)
+    for x_mm, y_mm, depth_mm, commanded, beyond in zip(
+        *(values.tolist() for values in (*positions, *flags)), strict=True
+    ):
+        yield (
+            f"\t{_number(x_mm, 4)}\t{_number(y_mm, 4)}\t{_number(depth_mm, 4)}\t{int(commanded)}"
+            f"\t{int(beyond)}"
         )
 
 

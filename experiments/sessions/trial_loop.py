@@ -22,7 +22,7 @@ from experiments.sessions.people import (
     SessionAborted,
 )
 from experiments.sessions.store import Store
-from experiments.sessions.strokes import advice_on, outside_grid
+from experiments.sessions.strokes import OFTEN, advice_on, beyond_edge, outside_grid
 from experiments.sessions.surfaces import Surfaces
 from experiments.sessions.task import Task
 from experiments.study.design import SessionPlan, Trial
@@ -100,6 +100,7 @@ def run_trials(
         if intake is not None:
             answers = people.respondent.welcome(intake)
             store.log("welcome", consent=intake.consent, answers=dict(answers))
+        rig.arm()
         running.run()
     except SessionAborted as aborted:
         faults = running.fall_silent()
@@ -336,9 +337,10 @@ class _Running:
         )
 
     def _call(self, sentence: str) -> None:
-        """Call the experimenter, whom the participant waits for."""
+        """Call the experimenter, whom the participant waits for, and go on once they confirm."""
         self._experimenter.call(sentence)
         self._respondent.wait(self._experimenter.ready)
+        self._rig.arm()  # they have confirmed: a force device may push again
 
     def _row(
         self, trial: Trial, answer: Mapping[str, object], *, valid: bool, repeats: int | None
@@ -366,6 +368,11 @@ class _Running:
             page, percent = advice
             self.note("outside", advice=page, percent=percent)
             self._respondent.announce(page, percent=percent)
+        beyond = beyond_edge(rows)
+        if beyond > OFTEN:
+            percent = round(100 * beyond)
+            self.note("outside", advice="strokes.beyond_edge", percent=percent)
+            self._respondent.announce("strokes.beyond_edge", percent=percent)
 
     def _keep(
         self, trial: int, faults: Sequence[Fault]

@@ -19,6 +19,7 @@ from experiments.study.task_plan import (
     check_plan,
     with_catch_trials,
 )
+from experiments.study.wall import WallSection
 from modeling import InputError
 from modeling.checks import check_keys
 from modeling.errors import shown
@@ -77,7 +78,7 @@ class Study(DescribedFile):
     """
 
     WHAT: ClassVar[str] = "a study file"
-    OPTIONAL: ClassVar[frozenset[str]] = frozenset({"publication"})
+    OPTIONAL: ClassVar[frozenset[str]] = frozenset({"publication", "wall"})
     name: Annotated[Label, key("title of the study")]
     seed: Annotated[
         int,
@@ -151,6 +152,10 @@ class Study(DescribedFile):
     measured_force: Annotated[
         bool, key("refuses a rig whose force is assumed, such as a mouse")
     ] = False
+    wall: Annotated[
+        WallSection | None,
+        key("what a force device renders under virtual surfaces; such a rig is then required"),
+    ] = None
     publication: Annotated[
         PublicationSection | None,
         key("who is named when the data are published; no part of what identifies the study"),
@@ -164,6 +169,8 @@ class Study(DescribedFile):
         super().__post_init__()
         self._check_trays()
         self._check_questions()
+        if self.wall is not None:
+            self.wall.check_textures(self.textures)
         self._plan_tasks()
         for claim in self.plan.claims:
             self._check_claim(claim)

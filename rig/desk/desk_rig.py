@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import date
 from math import inf, isfinite
 from typing import Any
@@ -22,9 +22,13 @@ from modeling.rendering.plan import RenderCounters
 from rig.desk.checks import Requirements, check_rig
 from rig.desk.journal import Journal
 from rig.desk.lock import rig_locked
-from rig.desk.parts import hand_settings, sound_output
+from rig.desk.parts import hand_reader, sound_output
 from rig.desk.pen import Pen
 from rig.desk.stimuli import check_made_for, check_stimulus
+from rig.desk.walls import Walls, check_walls, usual_stiffness_n_per_mm
+from rig.force.hand import ForceHand
+from rig.force.states import State
+from rig.force.wall import Wall
 from rig.hand.reader import HandReader
 from rig.interface import (
     Acceleration,
@@ -70,14 +74,18 @@ class DeskRig:
     requirements : Requirements, optional
         Those of the study; without them neither calibration nor force are checked.
     override : str, optional
-        Reason to use it although its latency is too long.
+        Reason to use it although its latency is too long, or a wall too stiff to be passive.
     seed : int
         Of all noise.
+    walls : Walls, optional
+        Of a force device: rendered under the virtual surfaces. Without it a wall as stiff as the
+        real surface.
 
     Raises
     ------
     InputError
-        If the study requires another rig, or its latency is too long.
+        If the study requires another rig, its latency is too long, or its device cannot render a
+        wall.
     """
 
     def __init__(
@@ -87,8 +95,14 @@ class DeskRig:
         requirements: Requirements | None = None,
         override: str | None = None,
         seed: int = 0,
+        walls: Walls | None = None,
     ) -> None:
         check_rig(rig_file, requirements, today=date.today(), override=override)
+        if rig_file.force is not None and walls is None:
+            walls = Walls(usual=Wall(stiffness_n_per_mm=usual_stiffness_n_per_mm(rig_file)))
+        if walls is not None:
+            check_walls(rig_file, walls, override=override)
+        self._walls = walls
         self._file = rig_file
         self._override = override
         self._seed = seed
@@ -134,8 +148,18 @@ class DeskRig:
             "SHA256": rig.sha256,
             "Override": self._override or "n/a",
             **found,
+            **self._stated_walls(),
             "Assumed": {name: figure.to_dict() for name, figure in rig.assumed()},
             "File": rig.to_dict(),
+        }
+
+    def _stated_walls(self) -> dict[str, object]:
+        """The walls of a force device, whose force is commanded, not sensed."""
+        if self._walls is None:
+            return {}
+        return {
+            "Force": "commanded",
+            "Walls": {name: asdict(wall) for name, wall in self._walls.named().items()},
         }
 
     def open(self) -> None:
@@ -151,7 +175,7 @@ class DeskRig:
             stack.enter_context(rig_locked(self._file.rig.name))
             live = stack.enter_context(Live.create())
             sound = sound_output(self._file, live, seed=self._seed)
-            reader = stack.enter_context(HandReader(live, hand_settings(self._file)))
+            reader = stack.enter_context(hand_reader(self._file, live))
             _wait_for_reading(live)
             stack.callback(sound.close)
             try:
@@ -210,6 +234,7 @@ class DeskRig:
         self.silence()
         sound = self.parts.sound
         start_s = self._started(lambda: sound.play(model))
+        self._show_wall(model.texture)
         speeds, forces = grid_of(model)
         return self._begin(
             "virtual",
@@ -287,6 +312,29 @@ class DeskRig:
             self._fail(str(lost))
             return now_s()
 
+    @property
+    def _device(self) -> ForceHand | None:
+        """What pushes; None of a rig without a force device."""
+        reader = self.parts.reader
+        return reader if isinstance(reader, ForceHand) else None
+
+    def arm(self) -> None:
+        """Let the force device push; a fault where it has one still."""
+        if (device := self._device) is not None:
+            self._try(device.arm)
+
+    def _show_wall(self, texture: str) -> None:
+        """Render the wall under a virtual surface; a fault where the device is not armed."""
+        device, walls = self._device, self._walls
+        if device is not None and walls is not None:
+            self._try(lambda: device.show(walls.of(texture)))
+
+    def _try(self, push: Callable[[], None]) -> None:
+        try:
+            push()
+        except InputError as fault:
+            self._fail(str(fault))
+
     def present_real(self, texture: str) -> float:
         """Fall silent, so that only the real surface is felt; returns since when."""
         self.silence()
@@ -310,7 +358,12 @@ class DeskRig:
         return own_s
 
     def silence(self) -> None:
-        """Fade to silence; returns when it has left. What was presented has ended."""
+        """Fade to silence; returns when it has left. What was presented has ended.
+
+        The wall of a force device ramps out.
+        """
+        if (device := self._device) is not None:
+            device.hide()
         counted = self.parts.sound.silence()
         self._notice()
         if self._now is None:
@@ -373,6 +426,9 @@ class DeskRig:
             problems.append(
                 "expected a measured latency, got none; measure it (tactileq rig latency)."
             )
+        device = self._device
+        if device is not None and device.status.state in (State.RELEASING, State.FAULT):
+            problems.append(f"the force device has let go: {device.status.sentence}")
         return RigHealth(
             hand_age_s=age_s,
             output_latency_s=parts.sound.latency_s,

@@ -13,7 +13,17 @@ import numpy as np
 
 from modeling.arrays import Floats
 from rig.interface import SURFACES, HandRows, Surface
-from rig.live.memory import BUTTON, FORCE_ASSUMED, GONE, STALE, UNDERFLOW, Live, Rows
+from rig.live.memory import (
+    BEYOND,
+    BUTTON,
+    FORCE_ASSUMED,
+    FORCE_COMMANDED,
+    GONE,
+    STALE,
+    UNDERFLOW,
+    Live,
+    Rows,
+)
 
 LOOK_S = 1.0  # from one look to the next; the memory holds half a minute
 
@@ -180,14 +190,23 @@ class Journal:
             within = (time_s >= segment.start_s) & (time_s < segment.end_s)
             surface[within] = SURFACES.index(segment.surface)
             presentation[within] = segment.number
-        unknown = (readings["flags"] & GONE) > 0
-        if not self.real_measured:
-            unknown |= surface == SURFACES.index("real")
+        gone = (readings["flags"] & GONE) > 0
+        on_real = surface == SURFACES.index("real")
+        unknown = gone | on_real if not self.real_measured else gone
+        commanded = (readings["flags"] & FORCE_COMMANDED) > 0
+        # What a device commands says nothing of the force on the real surface.
+        no_force = unknown | (commanded & on_real)
         return HandRows(
             time_s=time_s - self.opened_s,
             speed_mm_s=np.where(unknown, nan, readings["speed_mm_s"]),
-            force_n=np.where(unknown, nan, readings["force_n"]),
+            force_n=np.where(no_force, nan, readings["force_n"]),
             surface=surface,
             presentation=presentation,
             force_assumed=((readings["flags"] & FORCE_ASSUMED) > 0) & ~unknown,
+            **{
+                name: np.where(gone | ~commanded, nan, readings[name])
+                for name in ("x_mm", "y_mm", "depth_mm")
+            },
+            force_commanded=commanded & ~no_force,
+            beyond_edge=(readings["flags"] & BEYOND) > 0,
         )

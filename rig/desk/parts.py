@@ -6,11 +6,16 @@ from pathlib import Path
 
 from modeling.vibrators.compensation import compensation_for
 from rig.capture.input import InputSettings
+from rig.force.hand import ForceHand
+from rig.force.settings import ForceSettings, Pose
+from rig.hand.reader import HandReader
 from rig.hand.settings import HandSettings
 from rig.live.memory import Live
 from rig.setup.rig_file import RigFile
 from rig.setup.sections import AccelerometerSection
 from rig.sound.output import SoundOutput
+
+SILENT_S = 0.06  # beyond three blocks: a wall is released where nothing was played for so long
 
 
 def sound_output(rig: RigFile, live: Live, *, seed: int = 0) -> SoundOutput:
@@ -56,6 +61,48 @@ def hand_settings(rig: RigFile) -> HandSettings:
         baud=hand.baud,
         grab=hand.grab,
         script=str(rig.path.parent / script) if script.suffix else hand.script,
+    )
+
+
+def hand_reader(rig: RigFile, live: Live, *, sounds: bool = True) -> HandReader:
+    """What reads the hand, not opened yet; a `ForceHand` where it also pushes.
+
+    Parameters
+    ----------
+    sounds : bool
+        Whether the rig also plays: then a wall is released where the sound ends.
+    """
+    settings = hand_settings(rig)
+    force = force_settings(rig, sounds=sounds)
+    return HandReader(live, settings) if force is None else ForceHand(live, settings, force)
+
+
+def force_settings(rig: RigFile, *, sounds: bool = True) -> ForceSettings | None:
+    """The force device in plain numbers; None of a rig without one."""
+    force, pose = rig.force, rig.pose
+    if force is None:
+        return None
+    period_s = rig.sound.block / rig.sound.rate_hz
+    return ForceSettings(
+        library=force.library,
+        serial=force.serial,
+        rate_hz=force.rate_hz,
+        delay_s=rig.hand.filter_delay_s.value,
+        contact_n=rig.hand.contact_n.value,
+        most_n=force.most_n.value,
+        most_n_per_s=force.most_n_per_s.value,
+        most_w=force.most_w.value,
+        most_mm_s=force.most_mm_s.value,
+        late_s=1e-3 * force.late_ms.value,
+        frozen_s=1e-3 * force.frozen_ms.value,
+        release_s=1e-3 * force.release_ms.value,
+        low_mm=force.low_mm,
+        high_mm=force.high_mm,
+        pose=Pose()
+        if pose is None
+        else Pose(origin_mm=pose.origin_mm, x=pose.x, y=pose.y, z=pose.z),
+        sound_s=SILENT_S + 3 * period_s if sounds else 0.0,
+        simulated=rig.simulated,
     )
 
 

@@ -30,6 +30,11 @@ def open_device(settings: HandSettings) -> Device:
         from rig.hand.evdev import EventDevice  # which needs calls that only Linux has
 
         return EventDevice.open(settings)
+    if settings.kind == "force":
+        raise InputError(
+            "expected a hand that only measures here, got a force device, whose servo runs in "
+            "sessions, tactileq feel and tactileq rig monitor; take another hand for this."
+        )
     raise InputError(
         f"expected a hand that this system can read, got a {settings.kind} on {sys.platform}; take "
         'kind = "window" or "serial".'

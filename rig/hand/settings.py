@@ -15,7 +15,7 @@ from modeling.checks import (
 )
 from modeling.errors import InputError, shown
 
-KINDS = ("tablet", "mouse", "serial", "window", "scripted")
+KINDS = ("tablet", "mouse", "serial", "window", "scripted", "force")
 SCRIPTS = ("strokes", "hold")
 
 Points = tuple[tuple[float, float], ...]

@@ -22,18 +22,22 @@
 #include <time.h>
 #endif
 
-#define TQ_LIVE_FORMAT 0x7471000000000003u /* changes with anything in this file */
+#define TQ_LIVE_FORMAT 0x7471000000000004u /* changes with anything in this file */
 #define TQ_RING 16384                      /* a power of 2; half a minute of readings or blocks */
 
 /* Flags of a reading. */
-enum { TQ_CONTACT = 1, TQ_BUTTON = 2, TQ_FORCE_ASSUMED = 4, TQ_SIMULATED = 8, TQ_GONE = 16 };
+enum {
+    TQ_CONTACT = 1, TQ_BUTTON = 2, TQ_FORCE_ASSUMED = 4, TQ_SIMULATED = 8, TQ_GONE = 16,
+    TQ_FORCE_COMMANDED = 32, /* what a force device was told to push with, not what a sensor says */
+    TQ_BEYOND = 64           /* below the height of a wall that is shown, but not on it */
+};
 /* Flags of a block. */
 enum { TQ_STALE = 1, TQ_UNDERFLOW = 2, TQ_NO_HEARTBEAT = 4 };
 
 /* A reading of the hand; NaN where nothing measures. */
 typedef struct {
     double time_s; /* of tq_now */
-    double x_mm, y_mm, speed_mm_s, force_n;
+    double x_mm, y_mm, depth_mm, speed_mm_s, force_n; /* depth below the wall of a force device */
     uint32_t flags, spare;
 } tq_reading;
 
@@ -51,13 +55,27 @@ typedef struct {
     uint32_t flags, taken;                 /* how many of them it was the first to look at */
 } tq_block;
 
+/* Words of a force device: what is asked of its servo (by the host), what it reports, who watches it. */
+enum {
+    TQ_WORD_ASKED,               /* count << 8 | what */
+    TQ_WORD_WALL,                /* 5: height, stiffness, damping, half of width and length */
+    TQ_WORD_PRESS = TQ_WORD_WALL + 5, /* N into the surface */
+    TQ_WORD_TICK,                /* time of the servo's last tick; from here on written by the servo */
+    TQ_WORD_TICKS,
+    TQ_WORD_STATE,               /* what was asked last << 16 | cause << 8 | state */
+    TQ_WORD_FORCE,               /* 3: command in the device's frame */
+    TQ_WORD_DEPTH = TQ_WORD_FORCE + 3,
+    TQ_WORD_WATCHDOG,            /* when the watchdog last looked */
+    TQ_WORD_COUNT
+};
+
 #define TQ_WORDS(type) (sizeof(type) / sizeof(uint64_t))
 
 struct tq_live {
     uint64_t format;
     uint64_t readings, blocks; /* how many were ever written */
     uint64_t heartbeat;        /* when the session last looked, by tq_put_time */
-    uint64_t spare[4];
+    uint64_t word[TQ_WORD_COUNT];
     uint64_t reading[TQ_RING][TQ_WORDS(tq_reading)];
     uint64_t block[TQ_RING][TQ_WORDS(tq_block)];
 };
@@ -126,6 +144,27 @@ static inline void tq_take(const uint64_t *slot, void *row, size_t words)
    words, words that are not atomic (a torn double is a plausible hand), a second writer, and counting
    the row before it is whole. */
 
+/* A word of a force device, written and read whole. */
+static inline void tq_put_word(tq_live *live, int which, uint64_t word)
+{
+    __atomic_store_n(&live->word[which], word, __ATOMIC_RELEASE);
+}
+
+static inline uint64_t tq_word(const tq_live *live, int which)
+{
+    return __atomic_load_n(&live->word[which], __ATOMIC_ACQUIRE);
+}
+
+static inline void tq_put_figure(tq_live *live, int which, double figure)
+{
+    tq_put_time(&live->word[which], figure);
+}
+
+static inline double tq_figure(const tq_live *live, int which)
+{
+    return tq_take_time(&live->word[which]);
+}
+
 /* Writes the next row of a ring; one writer only. */
 static inline void tq_append(uint64_t *ring, uint64_t *count, const void *row, size_t words)
 {
@@ -184,10 +223,10 @@ static inline void tq_heartbeat(tq_live *live, double time_s)
 }
 
 static inline void tq_write_reading(tq_live *live, double time_s, double x_mm, double y_mm,
-                                    double speed_mm_s, double force_n, uint32_t flags)
+                                    double depth_mm, double speed_mm_s, double force_n, uint32_t flags)
 {
     tq_reading row;
-    row.time_s = time_s, row.x_mm = x_mm, row.y_mm = y_mm;
+    row.time_s = time_s, row.x_mm = x_mm, row.y_mm = y_mm, row.depth_mm = depth_mm;
     row.speed_mm_s = speed_mm_s, row.force_n = force_n;
     row.flags = flags, row.spare = 0;
     tq_append(live->reading[0], &live->readings, &row, TQ_WORDS(tq_reading));

@@ -10,6 +10,7 @@ import os
 import secrets
 import tempfile
 from contextlib import suppress
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ except ImportError:  # no compiler at installation
     _live = None
 
 # Flags of a reading, and of a block.
-CONTACT, BUTTON, FORCE_ASSUMED, SIMULATED, GONE = 1, 2, 4, 8, 16
+CONTACT, BUTTON, FORCE_ASSUMED, SIMULATED, GONE, FORCE_COMMANDED, BEYOND = 1, 2, 4, 8, 16, 32, 64
 STALE, UNDERFLOW, NO_HEARTBEAT = 1, 2, 4
 
 HEARTBEAT_S = 1.0  # the session writes a heartbeat at least this often
@@ -37,6 +38,7 @@ READING = np.dtype(
         ("time_s", "f8"),
         ("x_mm", "f8"),
         ("y_mm", "f8"),
+        ("depth_mm", "f8"),
         ("speed_mm_s", "f8"),
         ("force_n", "f8"),
         ("flags", "u4"),
@@ -169,6 +171,7 @@ class Live:
         speed_mm_s: float,
         force_n: float,
         flags: int,
+        depth_mm: float = nan,
     ) -> None:
         """Add a reading of the hand; only one process may.
 
@@ -178,14 +181,18 @@ class Live:
             By `now_s`.
         x_mm, y_mm : float
             Position; NaN where it is not measured.
+        depth_mm : float
+            Below the wall of a force device.
         speed_mm_s : float
             With its sign.
         force_n : float
             ≥ 0.
         flags : int
-            Sum of CONTACT, BUTTON, FORCE_ASSUMED, SIMULATED, GONE.
+            Sum of CONTACT, BUTTON, FORCE_ASSUMED, SIMULATED, GONE, FORCE_COMMANDED, BEYOND.
         """
-        self._lib.tq_write_reading(self.address, time_s, x_mm, y_mm, speed_mm_s, force_n, flags)
+        self._lib.tq_write_reading(
+            self.address, time_s, x_mm, y_mm, depth_mm, speed_mm_s, force_n, flags
+        )
 
     def heartbeat(self) -> None:
         """Write the session's heartbeat, without which playback falls silent.

@@ -16,6 +16,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
+from modeling.errors import InputError
 from modeling.files.described import BESIDE, DescribedFile, keys_of, naming
 from modeling.files.documents import read_toml
 from modeling.files.hashes import sha256_of_values
@@ -25,6 +26,7 @@ from modeling.rendering.limits import Limits
 from modeling.vibrators.vibrator import Vibrator
 from rig.setup.editing import with_values
 from rig.setup.figures import Curve, Figure
+from rig.setup.force_sections import ForceSection, PoseSection
 from rig.setup.sections import (
     AccelerometerSection,
     CalibrationSection,
@@ -46,9 +48,11 @@ class RigFile(DescribedFile):
 
     Parameters
     ----------
-    rig, sound, vibrator, limits, hand, accelerometer, latency, calibration, real_surface
-        Its sections (`rig.setup.sections`). None where there is no accelerometer, and where
-        latency or calibration have not been measured yet.
+    rig, sound, vibrator, limits, hand, force, pose, accelerometer, latency, calibration
+        Its sections (`rig.setup.sections`, `rig.setup.force_sections`). None where there is no
+        force device or accelerometer, and where pose, latency or calibration have not been
+        measured yet.
+    real_surface : RealSurfaceSection
     path : Path
         The file.
     identified : Vibrator, optional
@@ -62,12 +66,29 @@ class RigFile(DescribedFile):
     vibrator: VibratorSection
     limits: LimitsSection = field(default=LimitsSection())
     hand: HandSection
+    force: ForceSection | None = None
+    pose: PoseSection | None = None
     accelerometer: AccelerometerSection | None = None
     latency: LatencySection | None = None
     calibration: CalibrationSection | None = None
     real_surface: RealSurfaceSection
     path: Annotated[Path, BESIDE] = Path()
     identified: Annotated[Vibrator | None, BESIDE] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.hand.kind == "force") != (self.force is not None):
+            raise InputError(
+                f'expected [force] with hand.kind = "force" and only with it, got kind = '
+                f'"{self.hand.kind}" {"without" if self.force is None else "with"} [force]; add '
+                "the one, or remove the other."
+            )
+        homed = None if self.force is None else self.force.homed_on
+        if self.pose is not None and homed is not None and self.pose.measured_on < homed:
+            raise InputError(
+                f"expected a pose that was measured since the force device was homed on {homed}, "
+                f"got one of {self.pose.measured_on}; measure it again (tactileq rig pose)."
+            )
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -172,7 +193,8 @@ class RigFile(DescribedFile):
     @property
     def simulated(self) -> bool:
         """Whether no person feels anything here: a scripted hand, or a card that is none."""
-        return self.hand.kind == "scripted" or self.sound.simulated
+        stands_in = self.force is not None and self.force.simulated
+        return self.hand.kind == "scripted" or self.sound.simulated or stands_in
 
 
 def _given(value: Any) -> Any:

@@ -12,7 +12,7 @@ from modeling.files.kinds import Name, Rate
 from rig.setup.figures import Curve, Figure
 
 LOUDEST_MASKING = 0.5
-HandKind = Literal["tablet", "mouse", "serial", "window", "scripted"]
+HandKind = Literal["tablet", "mouse", "serial", "window", "scripted", "force"]
 _WITHOUT_FORCE = ("mouse", "window")
 _LEAST = 1e-6  # far below any rig's, and far above what a division by it could not hold
 Channel = Annotated[int, key(ge=1, le=64)]
@@ -159,7 +159,9 @@ class HandSection(FileSection):
     """What measures the hand, and what is assumed where it measures nothing."""
 
     WHERE: ClassVar[str] = "[hand]"
-    kind: Annotated[HandKind, key("window: not for studies; scripted: simulated")]
+    kind: Annotated[
+        HandKind, key("window: not for studies; scripted: simulated; force: needs [force]")
+    ]
     device: (
         Annotated[Name, key("path or name of the device; without it the only one that fits")] | None
     ) = None
@@ -237,7 +239,7 @@ class HandSection(FileSection):
 
     @property
     def measures_force(self) -> bool:
-        """Whether force comes from the device, and not from an assumption."""
+        """Whether force comes from the device, commanded by or sensed at it, not an assumption."""
         if self.kind == "tablet":
             return self.pressure_curve is not None
         return self.kind not in _WITHOUT_FORCE
@@ -294,3 +296,21 @@ class RealSurfaceSection(FileSection):
         bool,
         key("whether the hand is also measured there; otherwise its history there is n/a"),
     ]
+    offset_mm: (
+        Annotated[
+            Figure, key("how far it lies below the wall of a force device", unit="mm", ge=0, le=500)
+        ]
+        | None
+    ) = None
+    stiffness: (
+        Annotated[
+            Figure,
+            key(
+                "of the springs that carry it; `tactileq rig stiffness` writes it",
+                unit="N/mm",
+                ge=_LEAST,
+                le=100,
+            ),
+        ]
+        | None
+    ) = None

@@ -57,8 +57,7 @@ def _watch(rig: RigFile, model: AnyModel | None, seconds: float | None) -> None:
     from rich.live import Live as Screen
 
     from rig.calibration.opening import opened_sound
-    from rig.desk.parts import hand_settings
-    from rig.hand.reader import HandReader
+    from rig.desk.parts import hand_reader
     from rig.live.child import Child
     from rig.live.memory import Live
     from rig.live.messages import Done
@@ -68,7 +67,7 @@ def _watch(rig: RigFile, model: AnyModel | None, seconds: float | None) -> None:
     rate_hz, period_s = rig.sound.rate_hz, rig.sound.block / rig.sound.rate_hz
     with (
         Live.create() as live,
-        HandReader(live, hand_settings(rig)) as hand,
+        hand_reader(rig, live) as hand,
         opened_sound(rig, live) as sound,
     ):
         monitor = Monitor(live, rate_hz=rate_hz, peak_g=rig.limits.peak_g.value, grid=_grid(model))

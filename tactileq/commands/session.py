@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from experiments.console.console import Console
     from experiments.study.models import ModelSets
     from experiments.study.study import Study
+    from rig.desk.walls import Walls
     from rig.interface import TextureRig
+    from rig.setup.rig_file import RigFile
 else:
     TaskName = Literal[tuple(ANSWER_TABLES)]
 
@@ -165,9 +167,20 @@ def rig_of(plan: Study, sets: ModelSets, *, rig: Path | None, override: str | No
     wanted = Requirements(
         calibration_days=plan.calibration_days, measured_force=plan.measured_force
     )
-    device = DeskRig(file, requirements=wanted, override=override)
+    device = DeskRig(file, requirements=wanted, override=override, walls=walls_of(plan, file))
     check_models(file, [shown for shown in every if not isinstance(shown, Stimulus)])
     return device
+
+
+def walls_of(plan: Study, rig: RigFile) -> Walls | None:
+    """What a force device renders; None for a rig and a study without one."""
+    from rig.desk.walls import Walls, usual_stiffness_n_per_mm
+
+    if plan.wall is None:
+        return None
+    usual = usual_stiffness_n_per_mm(rig)
+    wall, by_texture = plan.wall.walls(usual)
+    return Walls(usual=wall, by_texture=by_texture)
 
 
 def models_of_study(

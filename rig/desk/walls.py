@@ -1,0 +1,119 @@
+"""The walls of a study on a rig's force device: one for each texture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import product
+
+from modeling import InputError
+from rig.force.wall import Wall, check_passive, largest_stiffness_n_per_mm
+from rig.setup.force_sections import ForceSection
+from rig.setup.rig_file import RigFile
+
+MARGIN = 0.5  # of the largest stiffness, where nothing says which
+Millimetres = tuple[float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Walls:
+    """The wall under each texture.
+
+    Parameters
+    ----------
+    usual : Wall
+        Under a texture that has none of its own.
+    by_texture : mapping of texture name to Wall
+    """
+
+    usual: Wall
+    by_texture: Mapping[str, Wall] = field(default_factory=dict)
+
+    def of(self, texture: str) -> Wall:
+        """Under this texture."""
+        return self.by_texture.get(texture, self.usual)
+
+    def named(self) -> dict[str, Wall]:
+        """Each wall by what it is called in a sentence."""
+        own = {f"the wall under {texture}": wall for texture, wall in self.by_texture.items()}
+        return {"the wall": self.usual, **own}
+
+
+def usual_stiffness_n_per_mm(rig: RigFile) -> float:
+    """That of the real surface where it was measured, else half of the largest that is passive."""
+    if rig.real_surface.stiffness is not None:
+        return rig.real_surface.stiffness.value
+    return MARGIN * max(1e-3, largest_of(_force(rig)))
+
+
+def largest_of(force: ForceSection, *, wall_damping_n_s_per_m: float = 0.0) -> float:
+    """Stiffness (N/mm) up to which this device's walls are passive."""
+    return largest_stiffness_n_per_mm(
+        rate_hz=force.rate_hz,
+        damping_n_s_per_m=force.damping.value,
+        delay_s=1e-3 * force.delay_ms.value,
+        wall_damping_n_s_per_m=wall_damping_n_s_per_m,
+    )
+
+
+def check_walls(rig: RigFile, walls: Walls, *, override: str | None = None) -> None:
+    """Refuse walls that a rig's device cannot render.
+
+    Parameters
+    ----------
+    override : str, optional
+        Reason to use a wall although it is stiffer than the passivity bound.
+
+    Raises
+    ------
+    InputError
+        For a wall that reaches out of the workspace, or a stiffer one than is passive.
+    """
+    force = _force(rig)
+    for name, wall in walls.named().items():
+        _check_within(rig, force, wall, name)
+        if override is None:
+            check_passive(
+                wall,
+                name,
+                rate_hz=force.rate_hz,
+                damping_n_s_per_m=force.damping.value,
+                delay_s=1e-3 * force.delay_ms.value,
+            )
+
+
+def _force(rig: RigFile) -> ForceSection:
+    if rig.force is None:
+        raise InputError(
+            f'expected a force device for a wall, got hand.kind = "{rig.hand.kind}" in {rig.path}; '
+            "use a rig with [force], or remove [wall] from the study file."
+        )
+    return rig.force
+
+
+def _check_within(rig: RigFile, force: ForceSection, wall: Wall, name: str) -> None:
+    """Refuse a wall of which a corner lies outside the workspace."""
+    for x, y in product((-0.5, 0.5), repeat=2):
+        corner = in_device(rig, (x * wall.width_mm, y * wall.length_mm, wall.height_mm))
+        for axis, at, low, high in zip("xyz", corner, force.low_mm, force.high_mm, strict=True):
+            if not low <= at <= high:
+                raise InputError(
+                    f"expected {name} within the workspace of the force device, got a corner at "
+                    f"{axis} = {at:.0f} mm (from {low:g} to {high:g} mm); make it smaller, or "
+                    "change its height or the pose."
+                )
+
+
+def in_device(rig: RigFile, point_mm: Millimetres) -> Millimetres:
+    """A point of the wall's frame in the frame of the device."""
+    pose = rig.pose
+    if pose is None:
+        return point_mm
+    x, y, z = (
+        pose.origin_mm[axis]
+        + point_mm[0] * pose.x[axis]
+        + point_mm[1] * pose.y[axis]
+        + point_mm[2] * pose.z[axis]
+        for axis in range(3)
+    )
+    return x, y, z

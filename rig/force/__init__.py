@@ -1,0 +1,1 @@
+"""Force devices: the servo of a virtual wall, its watchdog, and back ends."""

@@ -1,0 +1,94 @@
+"""What host, servo and watchdog of a force device write into the memory that they share."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from rig.force.states import Ask, Status
+from rig.force.wall import Wall
+from rig.live.memory import Live, compiled, now_s
+
+ANSWER_S = 0.1
+_LOOK_S = 0.0005
+
+
+class Control:
+    """The words of a force device in shared memory; one process at a time asks.
+
+    Parameters
+    ----------
+    live : Live
+        Has to outlive this.
+    """
+
+    def __init__(self, live: Live) -> None:
+        self._live = live
+        self._lib: Any = compiled().lib
+
+    @property
+    def status(self) -> Status:
+        """What the servo last reported."""
+        return Status.from_word(self._word(self._lib.TQ_WORD_STATE))
+
+    @property
+    def ticks(self) -> int:
+        """How many there ever were."""
+        return self._word(self._lib.TQ_WORD_TICKS)
+
+    @property
+    def tick_s(self) -> float:
+        """When the servo last ticked, by `now_s`; 0 before."""
+        return self._figure(self._lib.TQ_WORD_TICK)
+
+    @property
+    def force_n(self) -> tuple[float, float, float]:
+        """What the servo commanded last, in the device's frame."""
+        first = self._lib.TQ_WORD_FORCE
+        return self._figure(first), self._figure(first + 1), self._figure(first + 2)
+
+    @property
+    def depth_mm(self) -> float:
+        """Of the tool below the wall's height; negative above."""
+        return self._figure(self._lib.TQ_WORD_DEPTH)
+
+    def ask(self, what: Ask, *, within_s: float = ANSWER_S) -> Status:
+        """Ask the servo for something; its status once that was done, or after this time."""
+        word = self._lib.TQ_WORD_ASKED
+        count = ((self._word(word) >> 8) + 1) & 0xFFFFFF
+        asked = count << 8 | what
+        self._lib.tq_put_word(self._live.address, word, asked)
+        until_s = now_s() + within_s
+        while (status := self.status).asked != asked and now_s() < until_s:
+            time.sleep(_LOOK_S)
+        return status
+
+    def set_wall(self, wall: Wall) -> None:
+        """The wall that is shown next."""
+        figures = (
+            wall.height_mm,
+            wall.stiffness_n_per_mm,
+            1e-3 * wall.damping_n_s_per_m,
+            wall.width_mm / 2,
+            wall.length_mm / 2,
+        )
+        for place, figure in enumerate(figures, start=self._lib.TQ_WORD_WALL):
+            self._lib.tq_put_figure(self._live.address, place, figure)
+
+    def press(self, force_n: float) -> None:
+        """Push into the surface while a wall is shown, to measure its stiffness."""
+        self._lib.tq_put_figure(self._live.address, self._lib.TQ_WORD_PRESS, force_n)
+
+    def missed(self, look_s: float, *, missed_s: float, since_s: float, every_s: float) -> bool:
+        """Watch the servo for so long; whether it stood still (`tq_watch`)."""
+        return bool(self._lib.tq_watch(self._live.address, look_s, missed_s, since_s, every_s))
+
+    def stood_still(self) -> None:
+        """Have the state say that the watchdog has ended the servo."""
+        self._lib.tq_stood_still(self._live.address)
+
+    def _word(self, which: int) -> int:
+        return int(self._lib.tq_word(self._live.address, which))
+
+    def _figure(self, which: int) -> float:
+        return float(self._lib.tq_figure(self._live.address, which))

@@ -1,0 +1,160 @@
+"""The servo's process: `python -m rig.force.process`, driven by `rig.force.messages`.
+
+Python opens the device and hands it to `tq_servo_run` (rig/force/servo.h), which keeps this thread
+until it is asked to stop. Where the parent is gone, the force ramps to 0 and the process ends
+(docs/force-device.md#processes).
+"""
+
+from __future__ import annotations
+
+import gc
+import threading
+from contextlib import suppress
+from math import nan
+from typing import Any
+
+from modeling.errors import InputError
+from rig.force.control import Control
+from rig.force.dhd import DhdLibrary
+from rig.force.messages import RunServo
+from rig.force.realtime import SERVO_PRIORITY, real_time
+from rig.force.settings import (
+    JUMP_MM,
+    MISSED_S,
+    UNWATCHED_S,
+    VELOCITY_HZ,
+    ForceSettings,
+)
+from rig.force.states import Ask
+from rig.hand.messages import HandFault, Ready
+from rig.live.driven import Parent
+from rig.live.memory import GONE, HEARTBEAT_S, SIMULATED, Live, compiled, now_s
+from rig.live.messages import Done
+
+AGAIN_S = 0.5  # between attempts to open a device that is gone
+_BEAT_S = 0.02
+
+
+def main() -> None:
+    """Run the servo until the parent is gone."""
+    with Parent() as parent:
+        wanted = parent.settings(RunServo)
+        with Live.attach(wanted.live) as live:
+            gone = threading.Event()
+            threading.Thread(target=_listen, args=(parent, live, gone), daemon=True).start()
+            _Servo(parent, live, wanted.settings, gone).run(patient=wanted.patient)
+
+
+def _listen(parent: Parent, live: Live, gone: threading.Event) -> None:
+    """Have the servo stop once the parent is gone."""
+    with suppress(OSError):
+        parent.serve(Done, lambda done: done)
+    gone.set()
+    with suppress(TypeError):  # the memory is released already
+        Control(live).ask(Ask.STOP, within_s=0)
+
+
+class _Servo:
+    def __init__(
+        self, parent: Parent, live: Live, settings: ForceSettings, gone: threading.Event
+    ) -> None:
+        self._parent, self._live, self._settings, self._gone = parent, live, settings, gone
+        self._library = DhdLibrary(settings.library)
+        self._told = ""
+
+    def run(self, *, patient: bool) -> None:
+        """Run with a device, and with it again where it was lost; never armed anew by itself."""
+        while not self._gone.is_set():
+            try:
+                self._run_once()
+                if not self._gone.is_set():
+                    raise InputError(
+                        "expected the force device to go on, got none; check its cable and power."
+                    )
+            except InputError as error:
+                if not patient:
+                    raise
+                self._tell(str(error))
+                self._wait()
+            patient = True
+        self._write_gone()
+
+    def _run_once(self) -> None:
+        number = self._library.find(self._settings.serial)
+        with self._library.opened(number) as name:
+            guarded = self._library.enable(number, watchdog_s=MISSED_S)
+            device = self._library.back_end(number)
+            servo, _kept = prepared(self._live, device, self._settings)
+            own = "its own watchdog" if guarded else "no watchdog of its own"
+            self._told = ""
+            real = real_time(SERVO_PRIORITY)
+            self._parent.send(
+                Ready(f"{name}, {own}, {'real-time' if real else 'ordinary'} priority")
+            )
+            gc.collect()
+            gc.freeze()
+            if not self._gone.is_set():
+                compiled().lib.tq_servo_run(servo)
+
+    def _tell(self, sentence: str) -> None:
+        if sentence != self._told:
+            self._told = sentence
+            self._parent.send(HandFault(sentence))
+
+    def _wait(self) -> None:
+        """Until the next attempt; the readings go on, and say that there is no device."""
+        until_s = now_s() + AGAIN_S
+        while now_s() < until_s and not self._gone.wait(_BEAT_S):
+            self._write_gone()
+
+    def _write_gone(self) -> None:
+        flags = GONE | (SIMULATED if self._settings.simulated else 0)
+        self._live.write_reading(now_s(), nan, y_mm=nan, speed_mm_s=0.0, force_n=0.0, flags=flags)
+
+
+def prepared(live: Live, device: Any, settings: ForceSettings) -> tuple[Any, Any]:
+    """A `tq_servo` that begins without force, and its memory, which has to be kept."""
+    module = compiled()
+    ffi, lib = module.ffi, module.lib
+    own = ffi.new(
+        "tq_servo_settings *",
+        {
+            "period_s": 1 / settings.rate_hz,
+            "delay_s": settings.delay_s,
+            "contact_n": settings.contact_n,
+            "heartbeat_s": HEARTBEAT_S,
+            "sound_s": settings.sound_s,
+            "watchdog_s": UNWATCHED_S if settings.watched else 0.0,
+            "simulated": settings.simulated,
+        },
+    )
+    memory = ffi.new("char[]", lib.tq_servo_size())
+    servo = ffi.cast("tq_servo *", memory)
+    lib.tq_servo_start(servo, live.address, device, own, limits_of(settings))
+    return servo, memory
+
+
+def limits_of(settings: ForceSettings) -> Any:
+    """The same limits as a `tq_force_limits`."""
+    pose = settings.pose
+    return compiled().ffi.new(
+        "tq_force_limits *",
+        {
+            **{
+                name: getattr(settings, name)
+                for name in ("late_s", "frozen_s", "release_s", "show_s", "most_n", "most_n_per_s")
+            },
+            "most_w": settings.most_w,
+            "most_mm_s": settings.most_mm_s,
+            "jump_mm": JUMP_MM,
+            "velocity_hz": VELOCITY_HZ,
+            "low_mm": settings.low_mm,
+            "high_mm": settings.high_mm,
+            "origin_mm": pose.origin_mm,
+            "axes": (*pose.x, *pose.y, *pose.z),
+        },
+    )
+
+
+if __name__ == "__main__":
+    main()

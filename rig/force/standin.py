@@ -1,0 +1,89 @@
+"""The stand-in for Force Dimension's library: a simulated device whose faults are set at will.
+
+What it gives is simulated (rig/force/standin.h, docs/force-device.md#stand-in).
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from modeling.errors import InputError
+
+try:
+    import rig.force._standin as _standin
+except ImportError:  # no compiler at installation
+    _standin = None
+
+
+def _module() -> Any:
+    if _standin is None:
+        raise InputError(
+            "expected the compiled parts of tactileq, which the stand-in of a force device needs, "
+            "got none; install a C compiler (gcc or clang), then tactileq again."
+        )
+    return _standin
+
+
+def library_path() -> str:
+    """What is loaded in place of the maker's library."""
+    return str(_module().__file__)
+
+
+class StandIn:
+    """A simulated device in a file; `fields` are those of `tq_standin`, read and set at once.
+
+    Parameters
+    ----------
+    path : Path
+        Made where there is none.
+    """
+
+    def __init__(self, path: Path) -> None:
+        module = _module()
+        self.path = path
+        size = int(module.lib.tq_standin_size())
+        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+        try:
+            new = os.fstat(handle).st_size != size
+            os.truncate(path, size)
+            self._memory = mmap.mmap(handle, size)
+        finally:
+            os.close(handle)
+        self._ffi, self._lib = module.ffi, module.lib
+        self._buffer = self._ffi.from_buffer(self._memory, require_writable=True)
+        self.fields = self._ffi.cast("tq_standin *", self._buffer)
+        if new:
+            self._lib.tq_standin_start(self.fields)
+
+    def reset(self) -> None:
+        """As it is by default, with its hand at the beginning of a stroke."""
+        self._lib.tq_standin_start(self.fields)
+
+    def force_n(self, time_s: float) -> tuple[float, float, float]:
+        """What its motors push with at a moment of the common clock."""
+        x, y, z = (self._lib.tq_standin_force(self.fields, time_s, axis) for axis in range(3))
+        return float(x), float(y), float(z)
+
+    def close(self) -> None:
+        """Give the memory back; the file stays."""
+        self.fields = None
+        self._ffi.release(self._buffer)
+        self._memory.close()
+
+    def __enter__(self) -> StandIn:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def default_device() -> Path:
+    """A device of this user, made where there is none."""
+    folder = Path("/dev/shm") if os.access("/dev/shm", os.W_OK) else Path(tempfile.gettempdir())
+    path = folder / f"tactileq-standin-{os.getuid() if hasattr(os, 'getuid') else 0}"
+    StandIn(path).close()
+    return path
