@@ -228,8 +228,8 @@ static inline void tq_force_tick(tq_force *f, const tq_sensed *sensed, double st
             force -= f->press_n;
         force = tq_force_clamped(f, force, least_s);
     } else if (f->state == TQ_RELEASING) { /* also without a reading: linearly to 0 */
-        double part = tq_force_size(f->fell_n) * (l->release_s > 0 ? least_s / l->release_s : 1);
-        force = f->normal_n - tq_force_limited(f->normal_n, part > 0 ? part : l->most_n);
+        double part = tq_force_size(f->fell_n) * (least_s > 1e-4 ? least_s : 1e-4) / l->release_s;
+        force = f->normal_n - tq_force_limited(f->normal_n, part);
     }
     f->normal_n = force;
     if (f->state == TQ_RELEASING && force == 0)

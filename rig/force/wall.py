@@ -74,8 +74,9 @@ def largest_stiffness_n_per_mm(
     b > K T/2 + |B| is necessary and sufficient without delay (J. E. Colgate and G. Schenkel,
     Passivity of a class of sampled-data systems: application to haptic interfaces, 1997). With a
     delay of whole periods the same condition,
-    b > T/2 / (1 − cos ωT) · Re{(1 − e^(−jωT)) H(e^(jωT))} at all ω, holds for K (T/2 + t_d) + |B|, which is sufficient and, for B = 0, necessary: the term
-    of K is largest at ω = 0, that of B is at most |B| (docs/force-device.md#stiffness).
+    b > T/2 / (1 − cos ωT) · Re{(1 − e^(−jωT)) H(e^(jωT))} at all ω, holds for
+    K (T/2 + t_d) + |B|, which is sufficient and, for B = 0, necessary: the term of K is largest at
+    ω = 0, that of B is at most |B| (docs/force-device.md#stiffness).
     """
     left = damping_n_s_per_m - abs(wall_damping_n_s_per_m)
     return 1e-3 * left / (0.5 / rate_hz + delay_s) if rate_hz < inf else inf
