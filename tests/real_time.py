@@ -19,7 +19,9 @@ from rig.monitoring.bare_thread import Look, WakeUps
 REPEATS = 2
 PERIOD_S = 128 / 48000  # a block of the audio server, which is as short of time
 ANSWER_S = 60.0
-LIVE = tuple(f"tests/rig/{room}/" for room in ("hand", "live", "monitoring", "capture", "desk"))
+LIVE = tuple(
+    f"tests/rig/{room}/" for room in ("hand", "live", "monitoring", "capture", "desk", "force")
+)
 
 
 class BareProcess:

@@ -52,6 +52,11 @@ class Control:
         """Of the tool below the wall's height; negative above."""
         return self._figure(self._lib.TQ_WORD_DEPTH)
 
+    @property
+    def watched_s(self) -> float:
+        """When the watchdog last looked, by `now_s`; 0 before."""
+        return self._figure(self._lib.TQ_WORD_WATCHDOG)
+
     def ask(self, what: Ask, *, within_s: float = ANSWER_S) -> Status:
         """Ask the servo for something; its status once that was done, or after this time."""
         word = self._lib.TQ_WORD_ASKED

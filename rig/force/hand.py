@@ -7,18 +7,19 @@ import time
 from contextlib import suppress
 
 from modeling.errors import InputError
-from rig.force.control import ANSWER_S, Control
+from rig.force.control import Control
 from rig.force.messages import Acted, RunServo, Servo, Watch
-from rig.force.settings import ForceSettings
+from rig.force.settings import UNWATCHED_S, ForceSettings
 from rig.force.states import Ask, Cause, State, Status
 from rig.force.wall import Wall
 from rig.hand.messages import Ready
-from rig.hand.reader import START_S, HandReader
+from rig.hand.reader import SILENT_S, START_S, HandReader
 from rig.hand.settings import HandSettings
 from rig.live.child import Child, ChildLost
 from rig.live.memory import Live, now_s
 from rig.live.messages import Done
 
+START_ANEW_S = 2.0  # for a process that takes the place of another one
 _LOOK_S = 0.002
 
 
@@ -43,6 +44,7 @@ class ForceHand(HandReader):
         self._force = force
         self._control = Control(live)
         self._watchdog: Child | None = None
+        self._watched_s = float("inf")  # since when a watchdog has to look
         self._reported: Status | None = None  # of the last fault that was told
 
     def open(self) -> None:
@@ -72,6 +74,11 @@ class ForceHand(HandReader):
         return self._control.status
 
     @property
+    def watchdog_pid(self) -> int | None:
+        """Number of the watchdog's process; None where there is none."""
+        return self._watchdog.pid if self._watchdog is not None else None
+
+    @property
     def control(self) -> Control:
         """What servo and host share."""
         return self._control
@@ -86,8 +93,8 @@ class ForceHand(HandReader):
         """
         if self.status.state == State.FAULT:
             self._control.ask(Ask.CLEAR)
-        until_s = now_s() + ANSWER_S
-        while self.status.state in (State.BOOT, State.RELEASING) and now_s() < until_s:
+        until_s = now_s() + START_ANEW_S
+        while self._begins and now_s() < until_s:
             time.sleep(_LOOK_S)
         if self.status.state == State.IDLE:
             self._control.ask(Ask.ARM)
@@ -99,6 +106,12 @@ class ForceHand(HandReader):
                 "whether it is connected."
             )
         self._reported = None
+
+    @property
+    def _begins(self) -> bool:
+        """Whether the servo, or a watchdog in place of another one, is not yet at work."""
+        unwatched = self._force.watched and now_s() - self._control.watched_s > UNWATCHED_S
+        return unwatched or self.status.state in (State.BOOT, State.RELEASING)
 
     def show(self, wall: Wall) -> None:
         """Render this wall; where it is penetrated already, it comes as a ramp.
@@ -125,7 +138,10 @@ class ForceHand(HandReader):
 
     def faults(self) -> tuple[str, ...]:
         """What went wrong since the last call, one sentence each."""
-        status = self.status
+        dog, status = self._watchdog, self.status
+        if dog is not None and now_s() - max(self._watched_s, self._control.watched_s) > SILENT_S:
+            self._watched_s = now_s()
+            dog.kill()  # suspended: another one takes its place
         if status.state in (State.FAULT, State.RELEASING) and self._reported is None:
             self._reported = status
             if status.cause != Cause.STOPPED:
@@ -155,6 +171,7 @@ class ForceHand(HandReader):
             ) from None
         if self._child is not None and self._child.runs:
             dog.send(Servo(self._child.pid))
+        self._watched_s = now_s()
         threading.Thread(target=self._hear, args=(dog,), daemon=True).start()
 
     def _hear(self, dog: Child) -> None:

@@ -39,7 +39,11 @@ class Law:
         self.lib.tq_force_set_wall(self.force, self.ffi.new("tq_wall *", given))
 
     def tick(
-        self, position_mm: Sequence[float] = (0.0, 0.0, 1.0), *, step_s: float = TICK_S, failed: bool = False
+        self,
+        position_mm: Sequence[float] = (0.0, 0.0, 1.0),
+        *,
+        step_s: float = TICK_S,
+        failed: bool = False,
     ) -> float:
         """One tick; the normal force."""
         self.sensed.position_mm = list(position_mm)

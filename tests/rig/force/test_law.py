@@ -43,7 +43,16 @@ def walks(tmp_path: Path, *words: object) -> dict[str, float]:
         source = Path(__file__).with_name("walks.c")
         options = ["-std=gnu99", "-O2", "-Wall", "-Wextra", "-Werror"]
         checked = ["-fsanitize=undefined", "-fno-sanitize-recover=all"]
-        command = ["gcc", *options, *checked, f"-I{HEADERS}", str(source), "-o", str(program), "-lm"]
+        command = [
+            "gcc",
+            *options,
+            *checked,
+            f"-I{HEADERS}",
+            str(source),
+            "-o",
+            str(program),
+            "-lm",
+        ]
         subprocess.run(command, check=True)
     found = subprocess.run(
         [str(program), *map(str, words)], check=True, capture_output=True, text=True
@@ -53,7 +62,11 @@ def walks(tmp_path: Path, *words: object) -> dict[str, float]:
 
 def test_every_pair_of_state_and_event_leads_where_the_table_says() -> None:
     lib = compiled().lib
-    assert (lib.TQ_STATES, lib.TQ_EVENTS, lib.TQ_CAUSES) == (len(State), len(ForceEvent), len(Cause))
+    assert (len(State), len(ForceEvent), len(Cause)) == (
+        lib.TQ_STATES,
+        lib.TQ_EVENTS,
+        lib.TQ_CAUSES,
+    )
     for state, event in product(State, ForceEvent):
         assert lib.tq_force_next(state, event) == TABLE.get((state, event), state), (state, event)
 
