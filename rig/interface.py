@@ -230,6 +230,9 @@ class PresentationRecord:
         Duration of the vibration that was played, silence under a resting hand included.
     dose_g2_s : float
         Its square (g²) over time, unweighted.
+    weighted_dose_g2_s : float
+        The same with the frequency weighting of the hand-arm system; 0 of a twin, which exposes
+        nobody (docs/method/rendering.md#exposure).
     misses : int
         Blocks that the card had to do without.
     stale_blocks : int
@@ -247,6 +250,7 @@ class PresentationRecord:
     counters: RenderCounters = field(default_factory=RenderCounters)
     played_s: float = 0.0
     dose_g2_s: float = 0.0
+    weighted_dose_g2_s: float = 0.0
     peak_g: float = 0.0
     misses: int = 0
     stale_blocks: int = 0
@@ -312,6 +316,10 @@ class TextureRig(Protocol):
     @property
     def stated(self) -> Mapping[str, object]:
         """What data say of the rig: plain values, such as its file's SHA-256; empty of a twin."""
+
+    @property
+    def highest_exposure_m_s2(self) -> float:
+        """Daily exposure A(8) after which nobody may be stimulated; infinite of a twin."""
 
     def open(self) -> None:
         """Start whatever plays and reads; InputError, in one sentence, where it cannot."""

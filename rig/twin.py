@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 
@@ -84,6 +85,11 @@ class SimulatedRig:
     def stated(self) -> Mapping[str, object]:
         """Nothing: a twin has no file."""
         return {}
+
+    @property
+    def highest_exposure_m_s2(self) -> float:
+        """Infinite: nobody is exposed."""
+        return inf
 
     def open(self) -> None:
         """Forget what was presented before; clock, presentations and the stroke restart."""

@@ -18,7 +18,7 @@ class SessionAborted(Exception):
     ----------
     reason : str
         As it is stored.
-    by : {"participant", "experimenter", "signal"}
+    by : {"participant", "experimenter", "signal", "program"}
         Who ended it.
     """
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field, replace
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -154,6 +155,7 @@ def run_session(
                 intake=_intake(stored.study, root, person),
                 agenda=_agenda(task, store),
                 pilot=said.pilot,
+                exposed_g2_s=exposed_g2_s(root, subject, on=date.today()),
             )
     finally:
         rig.close()

@@ -10,7 +10,7 @@ from modeling import InputError
 from rig.interface import Presentable, Stimulus, TextureRig, ToneBurst
 
 HIGHEST_RATING = 100.0
-Whose = Literal["participant", "experimenter", "signal"]
+Whose = Literal["participant", "experimenter", "signal", "program"]
 
 
 class Note(Protocol):

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from statistics import median
 
 from experiments.sessions.agenda import Agenda
+from experiments.sessions.exposure import EXPOSURE, Exposure
 from experiments.sessions.people import (
     Experimenter,
     Intake,
@@ -66,6 +67,7 @@ def run_trials(
     intake: Intake | None = None,
     agenda: Agenda | None = None,
     pilot: bool = False,
+    exposed_g2_s: float = 0.0,
 ) -> SessionResult:
     """Run all trials of a session that are open; the rig is silent afterwards, whatever happens.
 
@@ -83,6 +85,8 @@ def run_trials(
         What is left of a session that was begun before; all of it without.
     pilot : bool
         Whether the answers do not count.
+    exposed_g2_s : float
+        Weighted vibration that the participant had that day (`experiments.sessions.exposure`).
 
     Returns
     -------
@@ -92,7 +96,15 @@ def run_trials(
     """
     agenda = agenda or Agenda.whole(plan.trials)
     running = _Running(
-        plan, task, models=models, rig=rig, people=people, store=store, agenda=agenda, pilot=pilot
+        plan,
+        task,
+        models=models,
+        rig=rig,
+        people=people,
+        store=store,
+        agenda=agenda,
+        pilot=pilot,
+        exposure=Exposure(exposed_g2_s, rig.highest_exposure_m_s2),
     )
     try:
         rig.silence()
@@ -145,7 +157,9 @@ class _Running:
         store: Store,
         agenda: Agenda,
         pilot: bool,
+        exposure: Exposure,
     ) -> None:
+        self._exposure = exposure
         self._plan, self._task, self._models = plan, task, models
         self._rig, self._store, self._agenda = rig, store, agenda
         self._respondent, self._experimenter = people.respondent, people.experimenter
@@ -268,6 +282,8 @@ class _Running:
         if again:
             trial = replace(trial, trial=self._next_number)
             self._next_number += 1
+        if excess := self._exposure.excess:
+            raise SessionAborted(excess, by="program")
         self._at = trial.trial
         began_s = time.monotonic()
         self._experimenter.report(self._progress(trial))
@@ -380,6 +396,11 @@ class _Running:
         """Store what the rig has kept of a trial, and return it; it is kept once."""
         self._presents = False
         rows, shown = self._rig.take_history(), self._rig.take_presentations()
+        weighted_g2_s = sum(one.weighted_dose_g2_s for one in shown)
+        if weighted_g2_s > 0:
+            self._exposure.add(weighted_g2_s)
+            a8_m_s2 = self._exposure.a8_m_s2
+            self.note(EXPOSURE, weighted_g2_s=weighted_g2_s, a8_m_s2=a8_m_s2)
         self._store.trace(trial, rows, presentations=shown, faults=faults)
         self._store.acceleration(trial, self._rig.take_acceleration())
         return rows, shown

@@ -126,6 +126,11 @@ class DeskRig:
         return self._file.simulated
 
     @property
+    def highest_exposure_m_s2(self) -> float:
+        """That of [limits] in its file."""
+        return self._file.highest_exposure_m_s2
+
+    @property
     def parts(self) -> RigParts:
         """What it consists of while it is open, for those who show it live."""
         if self._open is None:
@@ -381,6 +386,7 @@ class DeskRig:
                 counters=counted.counters if counted and self._playing else RenderCounters(),
                 played_s=played.frames / self._file.sound.rate_hz,
                 dose_g2_s=played.square_sum_g2 / self._file.sound.rate_hz,
+                weighted_dose_g2_s=played.weighted_square_sum_g2 / self._file.sound.rate_hz,
                 peak_g=played.peak_g,
                 misses=played.misses,
                 stale_blocks=played.stale,

@@ -42,6 +42,7 @@ class Played:
 
     frames: int = 0
     square_sum_g2: float = 0.0
+    weighted_square_sum_g2: float = 0.0
     peak_g: float = 0.0
     misses: int = 0
     stale: int = 0
@@ -51,6 +52,7 @@ class Played:
         """Add n blocks (BLOCK), at least one."""
         self.frames += int(blocks["frames"].sum())
         self.square_sum_g2 += float(blocks["square_sum_g2"].sum())
+        self.weighted_square_sum_g2 += float(blocks["weighted_square_sum_g2"].sum())
         self.peak_g = max(self.peak_g, float(blocks["peak_g"].max()))
         self.misses += int(np.count_nonzero(blocks["flags"] & UNDERFLOW))
         self.stale += int(np.count_nonzero(blocks["flags"] & STALE))

@@ -43,6 +43,7 @@ def sound_output(rig: RigFile, live: Live, *, seed: int = 0) -> SoundOutput:
         limits=rig.safe_limits,
         compensation=compensation,
         seed=seed,
+        vibrator=rig.identified,
     )
 
 

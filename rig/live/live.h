@@ -48,6 +48,7 @@ typedef struct {
     double speed_mm_s, force_n;            /* the hand as read last; 0 where that is stale */
     double hand_s;                         /* the hand of its first sample is that of this time */
     double square_sum_g2;                  /* of all its samples */
+    double weighted_square_sum_g2;         /* the same after the weighting of exposure */
     uint64_t position;                     /* samples since the stream began */
     uint64_t readings;                     /* how many were written up to the last that it took in */
     uint32_t frames, presentation;         /* what played in it last, 0 for nothing */

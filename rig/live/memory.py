@@ -53,6 +53,7 @@ BLOCK = np.dtype(
         ("force_n", "f8"),
         ("hand_s", "f8"),
         ("square_sum_g2", "f8"),
+        ("weighted_square_sum_g2", "f8"),
         ("position", "u8"),
         ("readings", "u8"),
         ("frames", "u4"),

@@ -23,6 +23,7 @@ from modeling.files.hashes import sha256_of_values
 from modeling.files.reading import read_bytes, read_text
 from modeling.files.writing import write_text
 from modeling.rendering.limits import Limits
+from modeling.vibrators.exposure import ACTION_VALUE_M_S2
 from modeling.vibrators.vibrator import Vibrator
 from rig.setup.editing import with_values
 from rig.setup.figures import Curve, Figure
@@ -189,6 +190,12 @@ class RigFile(DescribedFile):
             duration_s=self.limits.duration_s.value,
             pause_s=self.limits.pause_s.value,
         )
+
+    @property
+    def highest_exposure_m_s2(self) -> float:
+        """Up to which daily exposure A(8) a participant may be stimulated."""
+        given = self.limits.exposure_m_s2
+        return ACTION_VALUE_M_S2 if given is None else given.value
 
     @property
     def simulated(self) -> bool:

@@ -152,6 +152,20 @@ class LimitsSection(FileSection):
     pause_s: Annotated[
         Figure, key("shortest silence that counts as a pause", unit="s", ge=_LEAST, le=60)
     ] = field(default=_assumed(0.1, "s"))
+    exposure_m_s2: (
+        Annotated[
+            Figure,
+            key(
+                "highest [daily exposure](method/rendering.md#exposure) A(8) of a participant, "
+                "after which a session ends; without it 2.5 m/s², the action value of the "
+                "European directive",
+                unit="m/s²",
+                ge=_LEAST,
+                le=5,
+            ),
+        ]
+        | None
+    ) = None
 
 
 @dataclass(frozen=True, kw_only=True)

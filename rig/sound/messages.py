@@ -21,6 +21,7 @@ class SoundSettings(Message, frozen=True, kw_only=True):
     masking_channel: int | None
     fullscale_per_g: float
     masking_key: int
+    weighting: list[list[float]]
 
 
 class Playing(Message, frozen=True):

@@ -22,6 +22,8 @@ from modeling.rendering.limits import Limits
 from modeling.rendering.noise import stream_key
 from modeling.rendering.plan import RenderCounters, RenderPlan, plan_for, usual_update_s
 from modeling.vibrators.compensation import Compensation
+from modeling.vibrators.exposure import hand_arm_sections
+from modeling.vibrators.vibrator import Vibrator
 from rig.live.child import ChildLost
 from rig.live.memory import (
     OLDEST_READING_S,
@@ -91,6 +93,8 @@ class SoundOutput:
         Undoes the vibrator's resonance; made for this rate.
     seed : int
         Of all noise.
+    vibrator : Vibrator, optional
+        Whose resonance the exposure of the hand is to count in.
 
     Raises
     ------
@@ -112,6 +116,7 @@ class SoundOutput:
         limits: Limits,
         compensation: Compensation | None = None,
         seed: int = 0,
+        vibrator: Vibrator | None = None,
     ) -> None:
         _check_channels(channels, vibration_channel, masking=masking_channel)
         _check_level(fullscale_per_g, limits)
@@ -130,6 +135,7 @@ class SoundOutput:
             masking_channel=masking_channel,
             fullscale_per_g=fullscale_per_g,
             masking_key=int(stream_key(seed, _MASKING_STREAM)),
+            weighting=hand_arm_sections(rate_hz, vibrator=vibrator).tolist(),
         )
         self._block_s = block / rate_hz
         self._played = PlayedBlocks(live, limits, block_s=self._block_s)

@@ -77,6 +77,10 @@ class Player:
             HEARTBEAT_S,
             settings.masking_key,
         )
+        sections = np.array(settings.weighting)
+        self._lib.tq_sound_weigh(
+            self._sound, self._ffi.from_buffer("double *", sections), len(sections)
+        )
         self._stream = self._open(device.index, rate_hz, channels, settings.block)
         self._stream.start()
 

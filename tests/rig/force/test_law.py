@@ -72,8 +72,8 @@ def test_every_pair_of_state_and_event_leads_where_the_table_says() -> None:
 
 
 def test_nothing_reaches_running_but_arm_and_then_show() -> None:
-    # From FAULT, over all sequences of six events: RUNNING only where CLEAR, a reading, ARM and SHOW
-    # stand among them in this order.
+    # From FAULT, over all sequences of six events: RUNNING only where CLEAR, a reading, ARM and
+    # SHOW stand among them in this order.
     lib = compiled().lib
     needed = (ForceEvent.CLEAR, ForceEvent.SENSED, ForceEvent.ARM, ForceEvent.SHOW)
     ways = 0

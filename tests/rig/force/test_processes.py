@@ -279,7 +279,7 @@ def test_no_process_of_a_session_that_ends_leaves_force_behind(
     with jack_server(block=128):
         host = Host(rig.path)
         try:
-            wait_until(lambda: size_n(device) > 0.5)
+            wait_until(lambda: size_n(device) > 0.5, seconds=5)
             start_s = now_s()
             os.kill(host.pids[whose], number)
             assert seconds_to_zero(device, start_s) < most_s + SETTINGS.release_s + 0.05
