@@ -119,7 +119,7 @@ def of_rig(file: Path, *, today: datetime.date) -> tuple[RigFile | None, list[Fi
         _sound(rig),
         _limits(rig),
         _hand(rig),
-        *([] if rig.force is None else _force(rig, rig.force)),
+        *([] if rig.force_device is None else _force(rig, rig.force_device)),
         _accelerometer(rig),
         _calibration(rig, today),
         _latency(rig, today),

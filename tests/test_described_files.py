@@ -134,6 +134,7 @@ RIG = Kind(
                 "rms_window_s": figure(1, "s"),
                 "duration_s": figure(60, "s"),
                 "pause_s": figure(0.1, "s"),
+                "exposure_m_s2": figure(2.5, "m/s²"),
             },
             "hand": {
                 "kind": "mouse",
@@ -152,6 +153,29 @@ RIG = Kind(
                 "grab": True,
                 "script": "hold",
             },
+            "force": {
+                "library": "/opt/libdhd.so",
+                "serial": 12,
+                "rate_hz": 2000,
+                "damping": figure(1, "N·s/m"),
+                "delay_ms": figure(0.5, "ms"),
+                "most_n": figure(6, "N"),
+                "most_n_per_s": figure(1000, "N/s"),
+                "most_w": figure(3, "W"),
+                "most_mm_s": figure(800, "mm/s"),
+                "late_ms": figure(5, "ms"),
+                "frozen_ms": figure(200, "ms"),
+                "release_ms": figure(40, "ms"),
+                "low_mm": [-50, -60, -70],
+                "high_mm": [50, 60, 70],
+                "homed_on": DAY,
+            },
+            "pose": {
+                "origin_mm": [1.5, 0, -2],
+                "x": [0, 1, 0],
+                "z": [0, 0, 1],
+                "measured_on": DAY,
+            },
             "accelerometer": {
                 "device": "USB",
                 "channel": 2,
@@ -165,7 +189,11 @@ RIG = Kind(
                 "measured_on": DAY,
             },
             "calibration": {"date": DAY, "rig": "desk rig", "serials": ["V1"]},
-            "real_surface": {"hand_measured": True},
+            "real_surface": {
+                "hand_measured": True,
+                "offset_mm": figure(80, "mm"),
+                "stiffness": figure(0.8, "N/mm"),
+            },
         },
     ),
     load=RigFile.load,
@@ -191,6 +219,21 @@ STUDY = Kind(
             "calibration_days": 30,
             "measured_force": True,
             "consent": {"version": "2026-11"},
+            "wall": {
+                "height_mm": 5,
+                "stiffness_n_per_mm": 0.5,
+                "damping_n_s_per_m": 0.1,
+                "width_mm": 80,
+                "length_mm": 60,
+                "under": [
+                    {
+                        "texture": "canvas",
+                        "height_mm": 4,
+                        "stiffness_n_per_mm": 0.4,
+                        "damping_n_s_per_m": 0,
+                    }
+                ],
+            },
             "publication": {
                 "description": "Ratings of three surfaces.",
                 "license": "CC-BY-4.0",

@@ -44,7 +44,7 @@ def desk(path: Path) -> Iterator[LiveRig]:
     """
     rig = RigFile.load(path)
     wall = None
-    if rig.force is not None:
+    if rig.force_device is not None:
         wall = Wall(stiffness_n_per_mm=usual_stiffness_n_per_mm(rig), width_mm=100, length_mm=100)
         check_walls(rig, Walls(usual=wall))
     with ExitStack() as opened:
@@ -74,8 +74,8 @@ def notes_on(rig: RigFile) -> tuple[str, ...]:
     late = rig.latency is not None and rig.latency.p95_ms.value > HIGHEST_LATENCY_MS
     notes = {
         "simulated hand": rig.hand.kind == "scripted",
-        "simulated force device": rig.force is not None and rig.force.simulated,
-        "force commanded, not sensed": rig.force is not None,
+        "simulated force device": rig.force_device is not None and rig.force_device.simulated,
+        "force commanded, not sensed": rig.force_device is not None,
         "simulated sound card": rig.sound.simulated,
         "force assumed": not rig.hand.measures_force,
         "level not calibrated": any(figure.assumed for figure in scale),

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.sessions.agenda import Agenda
+from experiments.sessions.exposure import exposed_g2_s
 from experiments.sessions.log import read_log
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.order import draw_session

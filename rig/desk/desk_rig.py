@@ -98,7 +98,7 @@ class DeskRig:
         walls: Walls | None = None,
     ) -> None:
         check_rig(rig_file, requirements, today=date.today(), override=override)
-        if rig_file.force is not None and walls is None:
+        if rig_file.force_device is not None and walls is None:
             walls = Walls(usual=Wall(stiffness_n_per_mm=usual_stiffness_n_per_mm(rig_file)))
         if walls is not None:
             check_walls(rig_file, walls, override=override)

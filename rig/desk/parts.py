@@ -80,7 +80,7 @@ def hand_reader(rig: RigFile, live: Live, *, sounds: bool = True) -> HandReader:
 
 def force_settings(rig: RigFile, *, sounds: bool = True) -> ForceSettings | None:
     """The force device in plain numbers; None of a rig without one."""
-    force, pose = rig.force, rig.pose
+    force, pose = rig.force_device, rig.pose
     if force is None:
         return None
     period_s = rig.sound.block / rig.sound.rate_hz

@@ -83,12 +83,12 @@ def check_walls(rig: RigFile, walls: Walls, *, override: str | None = None) -> N
 
 
 def _force(rig: RigFile) -> ForceSection:
-    if rig.force is None:
+    if rig.force_device is None:
         raise InputError(
             f'expected a force device for a wall, got hand.kind = "{rig.hand.kind}" in {rig.path}; '
             "use a rig with [force], or remove [wall] from the study file."
         )
-    return rig.force
+    return rig.force_device
 
 
 def _check_within(rig: RigFile, force: ForceSection, wall: Wall, name: str) -> None:

@@ -22,6 +22,7 @@ typedef struct {
     double mass, friction;
     double hand_stiffness, hand_damping; /* 0: nobody holds it */
     double stroke, stroke_hz, press;     /* the hand's target: back and forth along x, and down to z = -press */
+    double rest[2];                      /* where it does so */
     double real_height, real_stiffness;  /* the real surface */
     double resolution;                   /* of the encoders */
     double noise_n;                      /* of the hand, a pulse of this size up or down every 0.1 ms */
@@ -41,7 +42,7 @@ static inline void tq_standin_start(tq_standin *d)
 {
     memset(d, 0, sizeof *d);
     d->devices = 1, d->major = 3, d->minor = 17, d->serial = 1;
-    d->mass = 0.2, d->friction = 0.5;
+    d->mass = 0.2, d->friction = 2;
     d->hand_stiffness = 300, d->hand_damping = 5;
     d->stroke = 0.03, d->stroke_hz = 0.8, d->press = 0.005;
     d->real_height = -0.02, d->real_stiffness = 1000, d->resolution = 1e-5;
@@ -73,7 +74,7 @@ static inline void tq_standin_move(tq_standin *d, double now_s)
         double phase = 6.283185307179586 * d->stroke_hz * (d->time_s - d->began_s);
         double turn = 6.283185307179586 * d->stroke_hz;
         double target[3], speed[3], fade = d->time_s - d->began_s < 1 ? d->time_s - d->began_s : 1;
-        target[0] = d->stroke * sin(phase), target[1] = 0, target[2] = 0.01 - fade * (0.01 + d->press);
+        target[0] = d->rest[0] + d->stroke * sin(phase), target[1] = d->rest[1], target[2] = 0.01 - fade * (0.01 + d->press);
         speed[0] = d->stroke * turn * cos(phase), speed[1] = speed[2] = 0;
         d->seed = d->seed * 6364136223846793005u + 1442695040888963407u;
         for (n = 0; n < 3; n++) {

@@ -63,6 +63,13 @@ class StandIn:
         """As it is by default, with its hand at the beginning of a stroke."""
         self._lib.tq_standin_start(self.fields)
 
+    def let_go(self, *, on_real: bool) -> None:
+        """Nobody holds the tool any more: it rests on the real surface, or in the air."""
+        one = self.fields
+        one.hand_stiffness = one.hand_damping = 0.0
+        one.velocity = [0.0, 0.0, 0.0]
+        one.position = [0.0, 0.0, one.real_height if on_real else one.real_height + 0.02]
+
     def force_n(self, time_s: float) -> tuple[float, float, float]:
         """What its motors push with at a moment of the common clock."""
         x, y, z = (self._lib.tq_standin_force(self.fields, time_s, axis) for axis in range(3))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from contextlib import suppress
+from typing import Self
 
 from modeling.errors import InputError
 from rig.hand.following import Follower
@@ -144,7 +145,7 @@ class HandReader:
         """Number of the process that reads; None where there is none."""
         return self._child.pid if self._child is not None else None
 
-    def __enter__(self) -> HandReader:
+    def __enter__(self) -> Self:
         self.open()
         return self
 

@@ -78,11 +78,10 @@ class RigFile(DescribedFile):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if (self.hand.kind == "force") != (self.force is not None):
+        if self.hand.kind == "force" and self.force is None:
             raise InputError(
-                f'expected [force] with hand.kind = "force" and only with it, got kind = '
-                f'"{self.hand.kind}" {"without" if self.force is None else "with"} [force]; add '
-                "the one, or remove the other."
+                'expected [force] for hand.kind = "force", got none; describe the device there, or '
+                "take another hand."
             )
         homed = None if self.force is None else self.force.homed_on
         if self.pose is not None and homed is not None and self.pose.measured_on < homed:
@@ -192,6 +191,11 @@ class RigFile(DescribedFile):
         )
 
     @property
+    def force_device(self) -> ForceSection | None:
+        """[force] where the hand is of that kind; None of any other rig."""
+        return self.force if self.hand.kind == "force" else None
+
+    @property
     def highest_exposure_m_s2(self) -> float:
         """Up to which daily exposure A(8) a participant may be stimulated."""
         given = self.limits.exposure_m_s2
@@ -200,7 +204,8 @@ class RigFile(DescribedFile):
     @property
     def simulated(self) -> bool:
         """Whether no person feels anything here: a scripted hand, or a card that is none."""
-        stands_in = self.force is not None and self.force.simulated
+        device = self.force_device
+        stands_in = device is not None and device.simulated
         return self.hand.kind == "scripted" or self.sound.simulated or stands_in
 
 

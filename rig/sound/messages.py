@@ -21,7 +21,7 @@ class SoundSettings(Message, frozen=True, kw_only=True):
     masking_channel: int | None
     fullscale_per_g: float
     masking_key: int
-    weighting: list[list[float]]
+    weighting: bytes  # sections of five numbers, float64
 
 
 class Playing(Message, frozen=True):

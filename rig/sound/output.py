@@ -135,7 +135,7 @@ class SoundOutput:
             masking_channel=masking_channel,
             fullscale_per_g=fullscale_per_g,
             masking_key=int(stream_key(seed, _MASKING_STREAM)),
-            weighting=hand_arm_sections(rate_hz, vibrator=vibrator).tolist(),
+            weighting=hand_arm_sections(rate_hz, vibrator=vibrator).tobytes(),
         )
         self._block_s = block / rate_hz
         self._played = PlayedBlocks(live, limits, block_s=self._block_s)

@@ -77,7 +77,7 @@ class Player:
             HEARTBEAT_S,
             settings.masking_key,
         )
-        sections = np.array(settings.weighting)
+        sections = np.frombuffer(settings.weighting).reshape(-1, 5)
         self._lib.tq_sound_weigh(
             self._sound, self._ffi.from_buffer("double *", sections), len(sections)
         )

@@ -9,7 +9,9 @@ from tactileq.commands.rig_check import rig_check
 from tactileq.commands.rig_latency import rig_latency
 from tactileq.commands.rig_monitor import rig_monitor
 from tactileq.commands.rig_play import rig_play
+from tactileq.commands.rig_pose import rig_pose
 from tactileq.commands.rig_range import rig_range
+from tactileq.commands.rig_stiffness import rig_stiffness
 from tactileq.commands.rig_twin import rig_twin
 
 rig = typer.Typer(
@@ -22,5 +24,7 @@ rig.command("monitor")(rig_monitor)
 rig.command("calibrate")(rig_calibrate)
 rig.command("latency")(rig_latency)
 rig.command("range")(rig_range)
+rig.command("pose")(rig_pose)
+rig.command("stiffness")(rig_stiffness)
 rig.command("play")(rig_play)
 rig.command("twin")(rig_twin)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from math import inf
 from pathlib import Path
 
 import pytest
@@ -40,6 +41,13 @@ class NotingRig:
 
     def close(self) -> None:
         self.opened = False
+
+    highest_exposure_m_s2 = inf
+
+    armed = 0
+
+    def arm(self) -> None:
+        self.armed += 1
 
     def now_s(self) -> float:
         return 0.0

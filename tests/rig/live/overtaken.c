@@ -19,14 +19,14 @@ static long moments, overtaken_at;
 static tq_reading row_of(uint64_t number)
 {
     double n = (double)number;
-    tq_reading row = {n, n, n, n, n, (uint32_t)number, 0};
+    tq_reading row = {n, n, n, n, n, n, (uint32_t)number, 0};
     return row;
 }
 
 static void write_row(uint64_t number)
 {
     double n = (double)number;
-    tq_write_reading(&live, n, n, n, n, n, (uint32_t)number);
+    tq_write_reading(&live, n, n, n, n, n, n, (uint32_t)number);
 }
 
 /* At the chosen one the writer writes a whole row, and the beginning of the next. */

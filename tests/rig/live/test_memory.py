@@ -140,7 +140,7 @@ def test_a_reader_who_is_overtaken_gets_no_row_under_way(tmp_path: Path) -> None
     subprocess.run(command, check=True)
     told = subprocess.run([program], check=True, capture_output=True, text=True).stdout
     moments, fewest, most, torn = map(int, told.split())
-    assert moments == 4 * 6 + 2  # of four rows of six words, and the count before and after
+    assert moments == 4 * 7 + 2  # of four rows of seven words, and the count before and after
     assert (fewest, most) == (3, 4)
     assert torn == 0
 
