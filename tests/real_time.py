@@ -54,7 +54,7 @@ class BareProcess:
 def needs_time(item: pytest.Item) -> bool:
     """Whether a test uses the audio server or belongs to a room that follows a hand."""
     asked = getattr(item, "fixturenames", ())
-    return "jack_server" in asked or item.nodeid.startswith(LIVE)
+    return bool({"jack_server", "force_device"} & set(asked)) or item.nodeid.startswith(LIVE)
 
 
 def repeat_where_the_machine_stood_still(items: Iterable[pytest.Item], bare: BareProcess) -> None:

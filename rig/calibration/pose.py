@@ -21,10 +21,13 @@ SHORTEST_MM = 20.0
 LEAST_SINE = 0.3
 STILL_MM = 1.0
 POINT_S = 0.5
+UNHELD_S = 60.0
 
 
 def touching_hand(rig: RigFile, live: Live) -> ForceHand:
-    """The force device in its own frame, never armed.
+    """The force device in its own frame, not armed.
+
+    Nobody has to hold it: readings may be the same for as long as they like.
 
     Raises
     ------
@@ -37,7 +40,7 @@ def touching_hand(rig: RigFile, live: Live) -> ForceHand:
             f'expected a force device, got hand.kind = "{rig.hand.kind}" in {rig.path}; nothing '
             "else has a pose."
         )
-    return ForceHand(live, hand_settings(rig), replace(settings, pose=Pose()))
+    return ForceHand(live, hand_settings(rig), replace(settings, pose=Pose(), frozen_s=UNHELD_S))
 
 
 @dataclass(frozen=True, kw_only=True)

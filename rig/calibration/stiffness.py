@@ -71,13 +71,14 @@ def press_on(
     InputError
         If the device lets go, or the surface does not give way like a spring.
     """
-    start_mm = -hand.control.depth_mm  # of a wall at height 0, which none was shown yet
-    if wall_n_per_mm is None:
-        wall = _NO_WALL
-    else:
-        wall = Wall(height_mm=start_mm, stiffness_n_per_mm=wall_n_per_mm)
     hand.arm()
-    hand.show(wall)
+    live.heartbeat()
+    hand.show(_NO_WALL)
+    wall, start_mm = _NO_WALL, _NO_WALL.height_mm - hand.control.depth_mm
+    if wall_n_per_mm is not None:
+        hand.hide()
+        wall = Wall(height_mm=start_mm, stiffness_n_per_mm=wall_n_per_mm)
+        hand.show(wall)
     forces, depths = [], []
     begin_s = time.monotonic()
     try:

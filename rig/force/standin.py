@@ -8,6 +8,7 @@ from __future__ import annotations
 import mmap
 import os
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ try:
     import rig.force._standin as _standin
 except ImportError:  # no compiler at installation
     _standin = None
+
+CARRIED_S = 1.0
 
 
 def _module() -> Any:
@@ -64,11 +67,13 @@ class StandIn:
         self._lib.tq_standin_start(self.fields)
 
     def let_go(self, *, on_real: bool) -> None:
-        """Nobody holds the tool any more: it rests on the real surface, or in the air."""
+        """Carry the tool onto the real surface, or into the air, and hold it no more."""
         one = self.fields
+        one.stroke, one.hand_stiffness, one.hand_damping = 0.0, 60.0, 5.0
+        one.press = -(one.real_height - 0.0005 if on_real else one.real_height + 0.02)
+        time.sleep(CARRIED_S)
         one.hand_stiffness = one.hand_damping = 0.0
         one.velocity = [0.0, 0.0, 0.0]
-        one.position = [0.0, 0.0, one.real_height if on_real else one.real_height + 0.02]
 
     def force_n(self, time_s: float) -> tuple[float, float, float]:
         """What its motors push with at a moment of the common clock."""
