@@ -206,7 +206,7 @@ def _char(number: int) -> bytes:
 
 def _stand_in() -> str:
     """Path of the stand-in, and the device of its own that it needs."""
-    from rig.force.standin import default_device, library_path
+    from rig.force.standin import PLACE, device_path, library_path
 
-    os.environ.setdefault("TACTILEQ_STANDIN", str(default_device()))
+    os.environ[PLACE] = str(device_path())
     return library_path()

@@ -19,6 +19,7 @@ try:
 except ImportError:  # no compiler at installation
     _standin = None
 
+PLACE = "TACTILEQ_STANDIN"  # in the environment: path of the device
 CARRIED_S = 1.0
 
 
@@ -93,9 +94,13 @@ class StandIn:
         self.close()
 
 
-def default_device() -> Path:
-    """A device of this user, made where there is none."""
+def device_path() -> Path:
+    """The device that processes share: the one that the environment names, else this user's.
+
+    Made where there is none.
+    """
     folder = Path("/dev/shm") if os.access("/dev/shm", os.W_OK) else Path(tempfile.gettempdir())
-    path = folder / f"tactileq-standin-{os.getuid() if hasattr(os, 'getuid') else 0}"
+    user = os.getuid() if hasattr(os, "getuid") else 0
+    path = Path(os.environ.get(PLACE) or folder / f"tactileq-standin-{user}")
     StandIn(path).close()
     return path

@@ -94,11 +94,9 @@ def rig_stiffness(
 def _ask(place: str, rig: RigFile) -> None:
     """Have the tool put there and let go; the stand-in's hand does both by itself."""
     if rig.force_device is not None and rig.force_device.simulated:
-        import os
+        from rig.force.standin import StandIn, device_path
 
-        from rig.force.standin import StandIn, default_device
-
-        with StandIn(Path(os.environ.get("TACTILEQ_STANDIN") or default_device())) as device:
+        with StandIn(device_path()) as device:
             device.let_go(on_real="real" in place)
         return
     typer.prompt(f"{place}, let go, then Enter", default="", show_default=False)

@@ -64,8 +64,9 @@ def test_the_check_says_what_no_hardware_has_confirmed(
 
 
 def test_the_stiffness_of_the_real_surface_is_found_and_the_wall_made_as_stiff(
-    main: Any, tmp_path: Path, force_device: StandIn
+    main: Any, tmp_path: Path, force_device: StandIn, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("rig.calibration.stiffness.PRESS_S", 1.5)
     force_device.fields.real_stiffness = 700.0
     file = force_rig(tmp_path).path
     done = main("rig", "stiffness", "--picture", "stiffness.png")
@@ -81,8 +82,9 @@ def test_the_stiffness_of_the_real_surface_is_found_and_the_wall_made_as_stiff(
 
 
 def test_a_surface_that_does_not_give_way_is_no_spring(
-    main: Any, tmp_path: Path, force_device: StandIn
+    main: Any, tmp_path: Path, force_device: StandIn, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("rig.calibration.stiffness.PRESS_S", 1.5)
     force_device.fields.real_stiffness = 1e5
     before = force_rig(tmp_path).path.read_text()
     done = main("rig", "stiffness")

@@ -35,6 +35,7 @@ def test_every_page_that_is_announced_has_a_text() -> None:
     tasks = ("absolute", "relative", "oddity", "threshold")
     pages = [f"{task}.{phase}" for task in tasks for phase in phases]
     pages += [f"strokes.too_{how}" for how in ("slow", "fast", "light", "hard")]
+    pages += ["strokes.beyond_edge"]
     for page in (*pages, "rest", "wait", "code", "known", "consent", "stopping"):
         assert {f"{page}.title", f"{page}.text"} <= texts.keys()
     assert {f"stopping.{reason}" for reason in REASONS} <= texts.keys()

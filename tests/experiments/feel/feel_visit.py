@@ -45,6 +45,9 @@ class NotingRig:
     def present_model(self, model):
         report(asked=[model.texture, model.n_layers])
 
+    def arm(self):
+        pass
+
     def silence(self):
         self.faults = ("the tablet is gone.",)
         report(asked=["silence"])

@@ -16,6 +16,7 @@ from experiments.feel import opening
 from experiments.feel.live_rig import LiveRig
 from experiments.feel.opening import NO_SOUND, demonstration, desk
 from modeling import InputError, TextureModel, compensation_for
+from rig.force.standin import StandIn
 from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, HEARTBEAT_S, Live, now_s
 from rig.setup.rig_file import SHIPPED_RIG_FILE
 from rig.sound.devices import SoundDevice
@@ -23,6 +24,7 @@ from rig.sound.supervision import SoundLost
 from stimuli.planted.textures import planted_texture
 from stimuli.planted.vibrators import planted_vibrator
 from tests.refusals import refused
+from tests.rig.force.rig_files import force_rig
 
 Jack = Callable[..., AbstractContextManager[Any]]
 SILENT_S = 5.0  # the longest that the machine of the tests may take
@@ -220,3 +222,29 @@ def test_a_late_or_gone_hand_is_none() -> None:
         write(0.2, CONTACT)
         assert not felt.hand().there
         assert felt.take_faults() == ("the tablet is gone.",)
+
+
+def test_a_force_device_is_armed_and_its_wall_felt(
+    jack_server: Jack, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TACTILEQ_STANDIN", str(tmp_path / "device"))
+    file = force_rig(tmp_path).path
+    with StandIn(tmp_path / "device") as device, jack_server(block=128), desk(file) as felt:
+        assert {"simulated force device", "force commanded, not sensed"} <= set(felt.notes)
+        felt.present_model(planted_texture("PVC"))
+
+        def presses() -> bool:
+            assert felt.take_faults() == ()
+            return felt.hand().force_n > 0.3
+
+        wait_until(presses)
+        assert felt.hand().depth_mm > 0.3
+        felt.silence()
+        wait_until(lambda: max(map(abs, device.force_n(now_s()))) == 0)
+        device.fields.nan_reads = 5
+        wait_until(lambda: bool(felt.take_faults()))
+        felt.present_model(planted_texture("PVC"))  # not by itself
+        assert any("got a position that is none" in told for told in felt.take_faults())
+        felt.arm()
+        felt.present_model(planted_texture("PVC"))
+        wait_until(presses)

@@ -21,6 +21,10 @@ class NotingRig:
     notes: tuple[str, ...] = ()
     asked: list[object] = field(default_factory=list)
     halted: bool = False
+    armed: int = 0
+
+    def arm(self) -> None:
+        self.armed += 1
 
     def present_model(self, model: Layered) -> None:
         self.asked.append((model.texture, model.n_layers))

@@ -21,7 +21,7 @@ from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session, task_named
 from modeling import InputError
-from rig.interface import Acceleration, Fault, ToneBurst
+from rig.interface import Acceleration, Fault, HandRows, PresentationRecord, ToneBurst
 from rig.twin import SimulatedRig
 from tests.experiments.scripted import Ready, Scripted
 from tests.refusals import refused
@@ -841,3 +841,70 @@ def test_what_was_measured_at_the_pen_belongs_to_its_trial(
     store = Keeping()
     run(store=store)
     assert store.kept == {1: 0, 2: 2, **dict.fromkeys(range(3, 8), 0)}
+
+
+# --- Force and exposure ---------------------------------------------------------------------
+
+
+def test_a_force_device_is_armed_at_the_start_and_where_people_have_confirmed_a_fault(
+    run: Callable[..., Ran], rig: Any
+) -> None:
+    class Failing(Scripted):
+        def rate(self, trial: Any, surfaces: Surfaces) -> Rating:
+            if trial.trial in (2, 3):
+                rig.faults.append(Fault(0.0, "it has let go.", invalidates=True))
+            armed.append(rig.armed)
+            return super().rate(trial, surfaces)
+
+    armed: list[int] = []
+    ran = run(Failing())
+    assert ran.result.invalid == 2
+    # Once before anything; again after each fault, once the experimenter was called; no more.
+    assert armed[:4] == [1, 1, 2, 3]
+    assert rig.armed == 3
+
+
+def test_a_days_exposure_ends_the_session_and_is_logged(run: Callable[..., Ran], rig: Any) -> None:
+    rig.highest_exposure_m_s2 = 2.5
+    dose = 0.4 * (2.5 / 9.80665) ** 2 * 8 * 3600  # of each trial: 40 % of what a day may have
+    rig.take_presentations = lambda: (
+        PresentationRecord(
+            number=1,
+            surface="virtual",
+            texture="MDF",
+            start_s=0.0,
+            end_s=1.0,
+            weighted_dose_g2_s=dose,
+        ),
+    )
+    ran = run()
+    assert ran.result.answered == 3
+    assert not ran.result.completed
+    assert "2.74 m/s²" in ran.result.reason
+    assert [event["a8_m_s2"] for event in ran.events("exposure")] == pytest.approx(
+        [2.5 * (0.4 * n) ** 0.5 for n in (1, 2, 3)]
+    )
+    full = run(exposed_g2_s=3 * dose)  # had it in another session of the day
+    assert full.result.answered == 0
+
+
+def test_who_strokes_beyond_the_edge_is_asked_to_stay_on_the_surface(
+    run: Callable[..., Ran], rig: Any
+) -> None:
+    rows = 10
+    beside = np.arange(rows) < 2
+    rig.take_history = lambda: HandRows(
+        time_s=np.arange(rows) / 500,
+        speed_mm_s=np.full(rows, 100.0),
+        force_n=np.ones(rows),
+        surface=np.full(rows, 2),
+        presentation=np.ones(rows, dtype=int),
+        force_assumed=np.zeros(rows, dtype=bool),
+        depth_mm=np.ones(rows),
+        beyond_edge=beside,
+    )
+    respondent = Scripted()
+    ran = run(respondent)
+    asked = [e for e in ran.events("outside") if e["advice"] == "strokes.beyond_edge"]
+    assert len(asked) == respondent.heard.count("strokes.beyond_edge") == ran.result.answered
+    assert {event["percent"] for event in asked} == {20}

@@ -12,6 +12,7 @@ from modeling.rendering.lattice import lattice_fields
 from modeling.rendering.limits import Limits
 from modeling.rendering.noise import stream_key
 from modeling.rendering.plan import RenderPlan, plan_for
+from modeling.vibrators.exposure import hand_arm_sections
 from rig.live.memory import CONTACT, OLDEST_READING_S, Live, Rows, compiled
 from stimuli.planted.textures import planted_texture
 from tests.modeling.rendering.lattices import planted_ar
@@ -43,6 +44,10 @@ class Callback:
             OLDEST_READING_S,
             1.0,
             5,
+        )
+        sections = hand_arm_sections(RATE_HZ)
+        self._lib.tq_sound_weigh(
+            self._sound, self._ffi.from_buffer("double *", sections), len(sections)
         )
 
     def texture(self, number: int, limits: Limits, gain: float = 1.0, *, name: str = "MDF") -> None:

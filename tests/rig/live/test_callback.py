@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
+from scipy.signal import lfilter, sosfilt
 
 from modeling.rendering.limits import Limits
+from modeling.vibrators.exposure import hand_arm_sections
 from rig.live.memory import CONTACT, GONE, NO_HEARTBEAT, STALE, Live
 from tests.modeling.rendering.lattices import in_python, planted_ar
 from tests.rig.live.callback import FADE, RATE_HZ, Array, Callback
@@ -211,3 +212,17 @@ def test_masking_noise_ends_with_what_is_halted(live: Live) -> None:
     callback.silence()
     callback.play(1024)
     assert callback.masked[FADE:].all()
+
+
+def test_the_weighted_sum_is_that_of_the_standards_filter(live: Live) -> None:
+    callback = Callback(live, scale=1.0)
+    rng = np.random.default_rng(4)
+    signal = 0.1 * rng.standard_normal(4800)
+    callback.signal(1, signal)
+    felt = np.concatenate([callback.play(128) for _ in range(60)])
+    sections = hand_arm_sections(RATE_HZ)
+    sos = np.hstack([sections[:, :3], np.ones((3, 1)), sections[:, 3:]])
+    weighted = sosfilt(sos, felt.astype(np.float64))
+    rows = callback.log()
+    assert rows["weighted_square_sum_g2"].sum() == pytest.approx(np.sum(weighted**2), rel=1e-6)
+    assert np.abs(felt).max() < 1  # nothing was clipped
