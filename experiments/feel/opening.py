@@ -13,8 +13,7 @@ from modeling import Compensation, InputError, Limits, Vibrator, compensation_fo
 from rig.desk.checks import HIGHEST_LATENCY_MS
 from rig.desk.lock import rig_locked
 from rig.desk.parts import hand_reader, sound_output
-from rig.desk.walls import Walls, check_walls, usual_stiffness_n_per_mm
-from rig.force.wall import Wall
+from rig.desk.walls import Walls, check_walls, usual_wall
 from rig.hand.reader import HandReader
 from rig.hand.settings import HandSettings
 from rig.live.memory import Live
@@ -45,7 +44,7 @@ def desk(path: Path) -> Iterator[LiveRig]:
     rig = RigFile.load(path)
     wall = None
     if rig.force_device is not None:
-        wall = Wall(stiffness_n_per_mm=usual_stiffness_n_per_mm(rig), width_mm=100, length_mm=100)
+        wall = usual_wall(rig)
         check_walls(rig, Walls(usual=wall))
     with ExitStack() as opened:
         opened.enter_context(rig_locked(rig.rig.name))

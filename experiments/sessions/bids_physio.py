@@ -8,6 +8,7 @@ from __future__ import annotations
 import gzip
 import io
 from collections.abc import Sequence
+from dataclasses import replace
 from math import inf
 
 import numpy as np
@@ -64,6 +65,16 @@ PHYSIO_COLUMNS = (
         limits=(0, inf),
         whole=True,
     ),
+)
+COMMANDED_COLUMNS = tuple(
+    replace(
+        column,
+        description=f"{column.description}; commanded by a force device, not sensed; n/a on the "
+        "real surface",
+    )
+    if column.name == "force_n"
+    else column
+    for column in PHYSIO_COLUMNS
 )
 
 

@@ -113,7 +113,11 @@ def _hand(held: StoredSession, runs: set[int]) -> tuple[Made, tuple[str, ...]]:
                 "TaskName": held.manifest.task,
                 "PhysioType": "generic",
                 **_simulated(held.manifest),
-                **sidecar_of(bids_physio.PHYSIO_COLUMNS),
+                **sidecar_of(
+                    bids_physio.COMMANDED_COLUMNS
+                    if "Walls" in held.manifest.rig
+                    else bids_physio.PHYSIO_COLUMNS
+                ),
             }
         )
         regular = bids_physio.at_regular_times(readings)

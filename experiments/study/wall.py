@@ -39,7 +39,18 @@ class WallSection(FileSection):
     """
 
     WHERE: ClassVar[str] = "[wall]"
-    height_mm: Height = 0.0
+    height_mm: (
+        Annotated[
+            float,
+            key(
+                "above the origin of the rig's pose; without it its `real_surface.offset_mm`, or 0",
+                unit="mm",
+                ge=-LARGEST_MM,
+                le=LARGEST_MM,
+            ),
+        ]
+        | None
+    ) = None
     stiffness_n_per_mm: (
         Annotated[
             float,
@@ -76,15 +87,17 @@ class WallSection(FileSection):
         """
         check_keys([wall.texture for wall in self.under], tuple(textures), where="[[wall.under]]")
 
-    def walls(self, usual_n_per_mm: float) -> tuple[Wall, dict[str, Wall]]:
-        """The usual wall, and those of textures that have their own.
+    def walls(self, usual: Wall) -> tuple[Wall, dict[str, Wall]]:
+        """The wall under most textures, and those of textures that have their own.
 
         Parameters
         ----------
-        usual_n_per_mm : float
-            Stiffness where the file says none.
+        usual : Wall
+            Whose height and stiffness count where the file says none.
         """
-        stiffness = usual_n_per_mm if self.stiffness_n_per_mm is None else self.stiffness_n_per_mm
+        stiffness, level = self.stiffness_n_per_mm, self.height_mm
+        stiffness = usual.stiffness_n_per_mm if stiffness is None else stiffness
+        level = usual.height_mm if level is None else level
 
         def wall(own: WallUnder | None = None) -> Wall:
             height, spring, damper = (
@@ -93,7 +106,7 @@ class WallSection(FileSection):
                 else (own.height_mm, own.stiffness_n_per_mm, own.damping_n_s_per_m)
             )
             return Wall(
-                height_mm=self.height_mm if height is None else height,
+                height_mm=level if height is None else height,
                 stiffness_n_per_mm=stiffness if spring is None else spring,
                 damping_n_s_per_m=self.damping_n_s_per_m if damper is None else damper,
                 width_mm=self.width_mm,

@@ -25,10 +25,9 @@ from rig.desk.lock import rig_locked
 from rig.desk.parts import hand_reader, sound_output
 from rig.desk.pen import Pen
 from rig.desk.stimuli import check_made_for, check_stimulus
-from rig.desk.walls import Walls, check_walls, usual_stiffness_n_per_mm
+from rig.desk.walls import Walls, check_walls, usual_wall
 from rig.force.hand import ForceHand
 from rig.force.states import State
-from rig.force.wall import Wall
 from rig.hand.reader import HandReader
 from rig.interface import (
     Acceleration,
@@ -99,7 +98,7 @@ class DeskRig:
     ) -> None:
         check_rig(rig_file, requirements, today=date.today(), override=override)
         if rig_file.force_device is not None and walls is None:
-            walls = Walls(usual=Wall(stiffness_n_per_mm=usual_stiffness_n_per_mm(rig_file)))
+            walls = Walls(usual=usual_wall(rig_file))
         if walls is not None:
             check_walls(rig_file, walls, override=override)
         self._walls = walls

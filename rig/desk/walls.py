@@ -39,11 +39,26 @@ class Walls:
         return {"the wall": self.usual, **own}
 
 
-def usual_stiffness_n_per_mm(rig: RigFile) -> float:
-    """That of the real surface where it was measured, else half of the largest that is passive."""
-    if rig.real_surface.stiffness is not None:
-        return rig.real_surface.stiffness.value
-    return MARGIN * max(1e-3, largest_of(_force(rig)))
+def usual_wall(rig: RigFile, *, size_mm: float = 100.0) -> Wall:
+    """A wall like the real surface: as far above it as the rig file says, and as stiff.
+
+    Where its stiffness was not measured, half of the largest that is passive.
+
+    Raises
+    ------
+    InputError
+        For a rig without a force device.
+    """
+    real = rig.real_surface
+    largest = largest_of(_force(rig))
+    return Wall(
+        height_mm=0.0 if real.offset_mm is None else real.offset_mm.value,
+        stiffness_n_per_mm=(
+            MARGIN * max(1e-3, largest) if real.stiffness is None else real.stiffness.value
+        ),
+        width_mm=size_mm,
+        length_mm=size_mm,
+    )
 
 
 def largest_of(force: ForceSection, *, wall_damping_n_s_per_m: float = 0.0) -> float:

@@ -53,4 +53,12 @@ static inline int tq_dhd_push(void *device, const double force_n[3])
     return dhd->set_force(force_n[0], force_n[1], force_n[2], (char)dhd->id) < 0;
 }
 
+/* The back end of an open device, which has to outlive it. */
+static inline tq_backend tq_dhd_backend(tq_dhd *device)
+{
+    tq_backend backend;
+    backend.device = device, backend.read = tq_dhd_read, backend.push = tq_dhd_push;
+    return backend;
+}
+
 #endif

@@ -178,8 +178,8 @@ class DhdLibrary:
         text = self._lib.dhdErrorGetLastStr()
         return str(self._ffi.string(text).decode(errors="replace")) if text else "no reason"
 
-    def back_end(self, number: int) -> Any:
-        """A `tq_dhd` for the servo; keep this library as long."""
+    def device(self, number: int) -> Any:
+        """A `tq_dhd` for the back end of the servo; keep both as long as that runs."""
         device = compiled().ffi.new("tq_dhd *")
         for field, name in (
             ("get_position", "dhdGetPosition"),

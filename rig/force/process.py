@@ -83,8 +83,9 @@ class _Servo:
         number = self._library.find(self._settings.serial)
         with self._library.opened(number) as name:
             guarded = self._library.enable(number, watchdog_s=MISSED_S)
-            device = self._library.back_end(number)
-            servo, _kept = prepared(self._live, device, self._settings)
+            device = self._library.device(number)
+            backend = compiled().lib.tq_dhd_backend(device)
+            servo, _kept = prepared(self._live, backend, self._settings)
             own = "its own watchdog" if guarded else "no watchdog of its own"
             self._told = ""
             real = real_time(SERVO_PRIORITY)
@@ -112,7 +113,7 @@ class _Servo:
         self._live.write_reading(now_s(), nan, y_mm=nan, speed_mm_s=0.0, force_n=0.0, flags=flags)
 
 
-def prepared(live: Live, device: Any, settings: ForceSettings) -> tuple[Any, Any]:
+def prepared(live: Live, backend: Any, settings: ForceSettings) -> tuple[Any, Any]:
     """A `tq_servo` that begins without force, and its memory, which has to be kept."""
     module = compiled()
     ffi, lib = module.ffi, module.lib
@@ -130,7 +131,7 @@ def prepared(live: Live, device: Any, settings: ForceSettings) -> tuple[Any, Any
     )
     memory = ffi.new("char[]", lib.tq_servo_size())
     servo = ffi.cast("tq_servo *", memory)
-    lib.tq_servo_start(servo, live.address, device, own, limits_of(settings))
+    lib.tq_servo_start(servo, live.address, backend, own, limits_of(settings))
     return servo, memory
 
 

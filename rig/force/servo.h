@@ -55,15 +55,14 @@ static inline size_t tq_servo_size(void)
     return sizeof(tq_servo);
 }
 
-/* Prepares a servo for a Force Dimension device. */
-static inline void tq_servo_start(tq_servo *s, tq_live *live, tq_dhd *device,
+/* Prepares a servo for an open device: without force, and with nothing asked for. */
+static inline void tq_servo_start(tq_servo *s, tq_live *live, tq_backend backend,
                                   const tq_servo_settings *settings, const tq_force_limits *limits)
 {
     memset(s, 0, sizeof *s);
     tq_force_start(&s->force, limits);
     tq_stroke_start(&s->stroke, settings->delay_s);
-    s->settings = *settings, s->live = live;
-    s->backend.device = device, s->backend.read = tq_dhd_read, s->backend.push = tq_dhd_push;
+    s->settings = *settings, s->live = live, s->backend = backend;
     s->asked = tq_word(live, TQ_WORD_ASKED); /* what was asked of an earlier servo is over */
     s->blocks = tq_blocks_written(live);
     s->read_s = -1;

@@ -174,12 +174,11 @@ def rig_of(plan: Study, sets: ModelSets, *, rig: Path | None, override: str | No
 
 def walls_of(plan: Study, rig: RigFile) -> Walls | None:
     """What a force device renders; None for a rig and a study without one."""
-    from rig.desk.walls import Walls, usual_stiffness_n_per_mm
+    from rig.desk.walls import Walls, usual_wall
 
     if plan.wall is None:
         return None
-    usual = usual_stiffness_n_per_mm(rig)
-    wall, by_texture = plan.wall.walls(usual)
+    wall, by_texture = plan.wall.walls(usual_wall(rig))
     return Walls(usual=wall, by_texture=by_texture)
 
 
