@@ -17,7 +17,7 @@ from modeling.errors import InputError
 from rig.force.control import Control
 from rig.force.dhd import DhdLibrary
 from rig.force.messages import RunServo
-from rig.force.realtime import SERVO_PRIORITY, real_time
+from rig.force.realtime import SERVO_PRIORITY, outlive_signals, real_time
 from rig.force.settings import (
     JUMP_MM,
     MISSED_S,
@@ -38,6 +38,7 @@ _BEAT_S = 0.02
 def main() -> None:
     """Run the servo until the parent is gone."""
     with Parent() as parent:
+        outlive_signals()
         wanted = parent.settings(RunServo)
         with Live.attach(wanted.live) as live:
             gone = threading.Event()

@@ -1,12 +1,23 @@
-"""Real-time priority, where a process may have it."""
+"""How the processes of a force device run: in real time where they may, and to their end."""
 
 from __future__ import annotations
 
 import os
+import signal
 import sys
 
 SERVO_PRIORITY = 20
 WATCHDOG_PRIORITY = 30
+
+
+def outlive_signals() -> None:
+    """Let no signal to all processes of a terminal or a session end this one.
+
+    It would leave the device with its force. It ends when its parent is gone, without force.
+    """
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
 
 
 def real_time(priority: int) -> bool:

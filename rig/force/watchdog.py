@@ -17,7 +17,7 @@ from modeling.errors import InputError
 from rig.force.control import Control
 from rig.force.dhd import DhdLibrary
 from rig.force.messages import Acted, Servo, Watch
-from rig.force.realtime import WATCHDOG_PRIORITY, real_time
+from rig.force.realtime import WATCHDOG_PRIORITY, outlive_signals, real_time
 from rig.force.settings import MISSED_S, ForceSettings
 from rig.force.states import State
 from rig.hand.messages import Ready
@@ -35,6 +35,7 @@ _PUSHES = (State.ARMED, State.RUNNING, State.RELEASING)
 def main() -> None:
     """Watch until the parent is gone and the servo has let go."""
     with Parent() as parent:
+        outlive_signals()
         wanted = parent.settings(Watch)
         library = DhdLibrary(wanted.settings.library)  # now: later there is no time
         with Live.attach(wanted.live) as live:

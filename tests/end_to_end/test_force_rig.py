@@ -21,7 +21,7 @@ from experiments.sessions.log import read_log
 from experiments.sessions.manifest import SessionManifest
 from experiments.verification.verifying import verify_data
 from modeling.vibrators.exposure import daily_exposure_m_s2
-from rig.force.standin import StandIn
+from rig.force.standin import StandIn, library_path
 from rig.force.states import State
 from rig.setup.rig_file import RigFile
 from tests.end_to_end.test_session_on_a_rig import (
@@ -57,6 +57,10 @@ def test_the_check_says_what_no_hardware_has_confirmed(
     said = main("rig", "check").stdout
     assert "libdhd 3.17: simulated" in said
     assert "passive up to 1.33 N/mm" in said
+    # Under any other name the same library is taken for the maker's.
+    text = (tmp_path / "rig.toml").read_text()
+    (tmp_path / "path.toml").write_text(text.replace('"stand-in"', f'"{library_path()}"'))
+    assert "libdhd 3.17: untested on hardware" in main("rig", "check", "--rig", "path.toml").stdout
     force_device.fields.devices = 0
     done = main("rig", "check")
     assert done.returncode == 1

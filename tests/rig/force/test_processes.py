@@ -240,7 +240,10 @@ class Host:
 
     def __init__(self, rig: Path) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, str(HERE / "host.py"), str(rig)], stdout=subprocess.PIPE, text=True
+            [sys.executable, str(HERE / "host.py"), str(rig)],
+            stdout=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
         )
         assert self.process.stdout is not None
         told = json.loads(self.process.stdout.readline())
@@ -256,6 +259,23 @@ class Host:
             except ProcessLookupError:
                 continue
         self.process.wait()
+
+
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM])
+def test_a_signal_to_all_processes_as_of_a_closed_terminal_leaves_no_force(
+    device: StandIn, jack_server: Jack, tmp_path: Path, number: signal.Signals
+) -> None:
+    rig = force_rig(tmp_path)
+    with jack_server(block=128):
+        host = Host(rig.path)
+        try:
+            wait_until(lambda: size_n(device) > 0.5, seconds=5)
+            start_s = now_s()
+            os.killpg(host.process.pid, number)
+            assert seconds_to_zero(device, start_s) < 0.1 + SETTINGS.release_s + 0.05
+            wait_until(lambda: not device.fields.is_open)  # the servo has closed it itself
+        finally:
+            host.close()
 
 
 @pytest.mark.parametrize(
