@@ -29,6 +29,7 @@ _MEANINGS = {
     "answer": "The trial was answered; the answer is in the table of answers",
     "training_over": "Training ended",
     "outside": "The participant was asked to stroke differently",
+    "exposure": "The vibration of the trial was added to the exposure of the participant's day",
     "break_began": "A break began",
     "break_ended": "The participant ended the break",
     "stop_asked": "The participant asked to stop, and was asked whether to",

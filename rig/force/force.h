@@ -113,8 +113,8 @@ static inline void tq_force_event(tq_force *f, int event, int cause)
         return;
     if (f->state == TQ_BOOT)
         f->cause = TQ_NO_CAUSE, f->sensed = 0;
-    if (f->state == TQ_RUNNING) { /* at once where that is not felt, else as a ramp */
-        f->engaged = 1, f->frozen_s = 0;
+    if (f->state == TQ_RUNNING) { /* at once where that is not felt, else as a ramp; not from deep below */
+        f->engaged = f->depth_mm * f->wall.stiffness_n_per_mm <= f->limits.most_n, f->frozen_s = 0;
         f->scale = f->depth_mm <= 0 ? 1 : f->scale;
     }
 }

@@ -112,16 +112,16 @@ def test_the_report_gets_the_appendix(main, place: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(validation_ranks, "RANK_KINDS", ranks)
     monkeypatch.setattr(validation_ranks, "STEPS", 100)
     assert main("simulate", "--study", "study.toml", "--data", "data").returncode == 0
-    told = main("analyze", "data", "--validate", 8, "--jobs", 1)
+    told = main("analyze", "data", "--validate", 4, "--jobs", 1)
     assert told.returncode == 0, told.stderr
     table = pd.read_csv(place / "analysis-results/tables/validation.tsv", sep="\t")
     assert len(table) == len(few)
-    assert set(table["simulations"]) == {8}
+    assert set(table["simulations"]) == {4}
     table = pd.read_csv(place / "analysis-results/tables/validation_model.tsv", sep="\t")
     assert list(table["situation"]) == [name for name, _ in of_model]
     assert (table["equality"] + table["different"] + table["inconclusive"] <= 1).all()
     table = pd.read_csv(place / "analysis-results/tables/validation_ranks.tsv", sep="\t")
-    assert {sum(map(int, ranks.split())) for ranks in table["ranks"]} == {8}
+    assert {sum(map(int, ranks.split())) for ranks in table["ranks"]} == {4}
     page = (place / "analysis-results/report.html").read_text()
     assert "Appendix: the procedures on planted truth" in page
     assert main("analyze", "data").returncode == 0

@@ -36,24 +36,19 @@ TABLE = {
 }
 
 
-def walks(tmp_path: Path, *words: object) -> dict[str, float]:
-    """What tests/rig/force/walks.c prints, by name."""
-    program = tmp_path / "walks"
-    if not program.exists():
-        source = Path(__file__).with_name("walks.c")
-        options = ["-std=gnu99", "-O2", "-Wall", "-Wextra", "-Werror"]
-        checked = ["-fsanitize=undefined", "-fno-sanitize-recover=all"]
-        command = [
-            "gcc",
-            *options,
-            *checked,
-            f"-I{HEADERS}",
-            str(source),
-            "-o",
-            str(program),
-            "-lm",
-        ]
-        subprocess.run(command, check=True)
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """tests/rig/force/walks.c, compiled."""
+    made = tmp_path_factory.mktemp("walks") / "walks"
+    source = Path(__file__).with_name("walks.c")
+    options = ["-std=gnu99", "-O2", "-Wall", "-Wextra", "-Werror", f"-I{HEADERS}"]
+    checked = ["-fsanitize=undefined", "-fno-sanitize-recover=all"]
+    subprocess.run(["gcc", *options, *checked, str(source), "-o", str(made), "-lm"], check=True)
+    return made
+
+
+def walks(program: Path, *words: object) -> dict[str, float]:
+    """What it prints, by name."""
     found = subprocess.run(
         [str(program), *map(str, words)], check=True, capture_output=True, text=True
     ).stdout.split()
@@ -88,8 +83,8 @@ def test_nothing_reaches_running_but_arm_and_then_show() -> None:
     assert ways > 0
 
 
-def test_a_random_walk_of_ten_million_faulty_steps_breaks_no_limit(tmp_path: Path) -> None:
-    found = walks(tmp_path, "faults", 1, 10_000_000)
+def test_a_random_walk_of_ten_million_faulty_steps_breaks_no_limit(program: Path) -> None:
+    found = walks(program, "faults", 1, 10_000_000)
     assert found["broken"] == 0
     assert found["largest"] == pytest.approx(5.0)  # the limit was reached
     assert found["longest"] <= ForceSettings().release_s + 0.004
@@ -99,17 +94,17 @@ def test_a_random_walk_of_ten_million_faulty_steps_breaks_no_limit(tmp_path: Pat
 
 @pytest.mark.parametrize("delay", [0, 1, 2])
 def test_a_wall_generates_energy_beyond_the_bound_and_none_within(
-    tmp_path: Path, delay: int
+    program: Path, delay: int
 ) -> None:
     for damper in (0.0, 0.3):
-        assert walks(tmp_path, "strokes", 3, 1000, 1.0, delay, damper)["positive"] == 0
-    assert walks(tmp_path, "strokes", 3, 1000, 2.0, delay, 0.0)["positive"] > 950
+        assert walks(program, "strokes", 3, 1000, 1.0, delay, damper)["positive"] == 0
+    assert walks(program, "strokes", 3, 1000, 2.0, delay, 0.0)["positive"] > 950
 
 
 @pytest.mark.parametrize("delay", [0, 1])
-def test_a_mass_comes_to_rest_below_the_bound_and_never_above(tmp_path: Path, delay: int) -> None:
-    assert walks(tmp_path, "mass", 0.8, delay)["worst"] < 0.01
-    assert walks(tmp_path, "mass", 1.2, delay)["worst"] > 10
+def test_a_mass_comes_to_rest_below_the_bound_and_never_above(program: Path, delay: int) -> None:
+    assert walks(program, "mass", 0.8, delay)["worst"] < 0.01
+    assert walks(program, "mass", 1.2, delay)["worst"] > 10
 
 
 @settings(max_examples=60, deadline=None)
@@ -168,6 +163,16 @@ def test_a_wall_that_is_switched_on_while_penetrated_comes_as_a_ramp() -> None:
     assert max(np.diff([0, *forces])) == pytest.approx(3.0 * TICK_S / ForceSettings().show_s)
     assert forces[99] == pytest.approx(1.5)
     assert forces[-1] == pytest.approx(3.0)
+
+
+def test_a_wall_that_is_switched_on_far_above_the_tool_waits_for_it_to_come_from_above() -> None:
+    law = Law(ForceSettings(most_n=5.0)).armed()
+    law.to((0, 0, -5.5))  # as on a real surface below: a spring of 1 N/mm would push with 5.5 N
+    law.event(ForceEvent.SHOW)
+    assert max(law.tick((0, 0, -5.5)) for _ in range(400)) == 0
+    assert law.force.beyond
+    law.to((0, 0, 1.0))
+    assert law.to((0, 0, -2.0)) == pytest.approx(2.0)
 
 
 def test_a_wall_that_is_switched_on_in_the_air_is_there_at_once() -> None:

@@ -161,8 +161,8 @@ static int strokes(unsigned long long seed, int count, double factor, int delay,
             held[k % 8] = f.normal_n;
             applied = k >= delay ? held[(k - delay) % 8] : 0;
             energy += applied * (height(&one, t + T) - z); /* exact: it is held for T */
-            for (sub = 0; sub < 20; sub++) {
-                double h = T / 20, dz = height(&one, t + (sub + 1) * h) - height(&one, t + sub * h);
+            for (sub = 0; sub < 5; sub++) {
+                double h = T / 5, dz = height(&one, t + (sub + 1) * h) - height(&one, t + sub * h);
                 energy -= b * dz * dz / h;
             }
             stored += fabs(applied * (height(&one, t + T) - z));
