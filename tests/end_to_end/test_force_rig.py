@@ -47,6 +47,7 @@ stiffness_n_per_mm = 0.8
 def force_device(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[StandIn]:
     monkeypatch.setenv("TACTILEQ_STANDIN", str(tmp_path / "device"))
     with StandIn(tmp_path / "device") as made:
+        made.fields.began_s -= 2  # its hand has come down already
         yield made
 
 
@@ -71,6 +72,7 @@ def test_the_stiffness_of_the_real_surface_is_found_and_the_wall_made_as_stiff(
     main: Any, tmp_path: Path, force_device: StandIn, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rig.calibration.stiffness.PRESS_S", 1.5)
+    monkeypatch.setattr("rig.force.standin.CARRIED_S", 0.7)
     force_device.fields.real_stiffness = 700.0
     file = force_rig(tmp_path).path
     done = main("rig", "stiffness", "--picture", "stiffness.png")
@@ -89,6 +91,7 @@ def test_a_surface_that_does_not_give_way_is_no_spring(
     main: Any, tmp_path: Path, force_device: StandIn, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rig.calibration.stiffness.PRESS_S", 1.5)
+    monkeypatch.setattr("rig.force.standin.CARRIED_S", 0.7)
     force_device.fields.real_stiffness = 1e5
     before = force_rig(tmp_path).path.read_text()
     done = main("rig", "stiffness")

@@ -16,4 +16,5 @@ def device(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[StandIn]
     path = tmp_path / "device"
     monkeypatch.setenv("TACTILEQ_STANDIN", str(path))
     with StandIn(path) as made:
+        made.fields.began_s -= 2  # its hand has come down already
         yield made
