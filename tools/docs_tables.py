@@ -43,7 +43,7 @@ TABLES = {
     **{f"answers-{task}": table.columns for task, table in answer_tables.ANSWER_TABLES.items()},
     "events": bids_events.EVENT_COLUMNS,
     "physio": bids_physio.PHYSIO_COLUMNS,
-    "hand": traces.HAND_COLUMNS,
+    "hand": traces.HAND_COLUMNS + traces.WALL_COLUMNS,
     "presentations": traces.PRESENTATION_COLUMNS,
 }
 PAGES = (
