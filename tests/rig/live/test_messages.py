@@ -16,6 +16,8 @@ from modeling import InputError
 from modeling.rendering.plan import RenderCounters
 from rig.capture.input import InputSettings
 from rig.desk import messages as pen
+from rig.force import messages  # noqa: F401
+from rig.force.settings import ForceSettings, Pose
 from rig.hand import messages as hand
 from rig.hand.settings import HandSettings
 from rig.live.messages import Message, Refused, decoded, received, send
@@ -37,6 +39,13 @@ MADE: dict[Any, st.SearchStrategy[Any]] = {
             HandSettings(kind="tablet", pressure_points=((0.0, 0.0), (0.5, 1.0), (1.0, 4.0))),
             HandSettings(kind="mouse", counts_per_mm=40.0, assumed_force_n=1.0, grab=True),
             HandSettings(kind="scripted", script="hold", speed_mm_s=-80.0),
+        ]
+    ),
+    ForceSettings: st.sampled_from(
+        [
+            ForceSettings(),
+            ForceSettings(library="stand-in", serial=7, late_s=0.019, watched=False),
+            ForceSettings(pose=Pose(origin_mm=(1.5, -2.0, 3.0), x=(0.0, 1.0, 0.0))),
         ]
     ),
     SimulatedTransducers: st.builds(SimulatedTransducers, seed=st.integers(0, 100)),
