@@ -227,7 +227,7 @@ def hand_words(hand: HandNow) -> str:
     if not hand.there:
         return "no hand"
     assumed = " (assumed)" if hand.force_assumed else ""
-    wall = "" if isnan(hand.depth_mm) else f" commanded   {max(hand.depth_mm, 0.0):.1f} mm deep"
+    wall = "" if isnan(hand.depth_mm) else f"   {max(hand.depth_mm, 0.0):.1f} mm deep"
     return f"{abs(hand.speed_mm_s):.0f} mm/s   {hand.force_n:.1f} N{assumed}{wall}"
 
 
