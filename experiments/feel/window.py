@@ -120,6 +120,7 @@ class FeelWindow:
 
         event.clearEvents()
         self._draw()  # the first drawing may take longer than a rig plays unattended
+        self.window.flip()  # which clears it: what comes next is not drawn over "stopped"
         self._visit.play()
         self._renew()
         while not self._ended:
