@@ -65,21 +65,21 @@ def hand_settings(rig: RigFile) -> HandSettings:
     )
 
 
-def hand_reader(rig: RigFile, live: Live, *, sounds: bool = True) -> HandReader:
-    """What reads the hand, not opened yet; a `ForceHand` where it also pushes.
+def hand_reader(rig: RigFile, live: Live) -> HandReader:
+    """What reads the hand, not opened yet; a `ForceHand` where it also pushes."""
+    settings = hand_settings(rig)
+    force = force_settings(rig)
+    return HandReader(live, settings) if force is None else ForceHand(live, settings, force)
+
+
+def force_settings(rig: RigFile, *, sounds: bool = True) -> ForceSettings | None:
+    """The force device in plain numbers; None of a rig without one.
 
     Parameters
     ----------
     sounds : bool
         Whether the rig also plays: then a wall is released where the sound ends.
     """
-    settings = hand_settings(rig)
-    force = force_settings(rig, sounds=sounds)
-    return HandReader(live, settings) if force is None else ForceHand(live, settings, force)
-
-
-def force_settings(rig: RigFile, *, sounds: bool = True) -> ForceSettings | None:
-    """The force device in plain numbers; None of a rig without one."""
     force, pose = rig.force_device, rig.pose
     if force is None:
         return None

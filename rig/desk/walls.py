@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 from itertools import product
 
 from modeling import InputError
-from rig.force.wall import Wall, check_passive, largest_stiffness_n_per_mm
+from rig.force.wall import Wall, largest_stiffness_n_per_mm
 from rig.setup.force_sections import ForceSection
 from rig.setup.rig_file import RigFile
 
 MARGIN = 0.5  # of the largest stiffness, where nothing says which
+USUAL_MM = 100.0
 Millimetres = tuple[float, float, float]
 
 
@@ -39,7 +40,7 @@ class Walls:
         return {"the wall": self.usual, **own}
 
 
-def usual_wall(rig: RigFile, *, size_mm: float = 100.0) -> Wall:
+def usual_wall(rig: RigFile) -> Wall:
     """A wall like the real surface: as far above it as the rig file says, and as stiff.
 
     Where its stiffness was not measured, half of the largest that is passive.
@@ -56,8 +57,8 @@ def usual_wall(rig: RigFile, *, size_mm: float = 100.0) -> Wall:
         stiffness_n_per_mm=(
             MARGIN * max(1e-3, largest) if real.stiffness is None else real.stiffness.value
         ),
-        width_mm=size_mm,
-        length_mm=size_mm,
+        width_mm=USUAL_MM,
+        length_mm=USUAL_MM,
     )
 
 
@@ -88,13 +89,7 @@ def check_walls(rig: RigFile, walls: Walls, *, override: str | None = None) -> N
     for name, wall in walls.named().items():
         _check_within(rig, force, wall, name)
         if override is None:
-            check_passive(
-                wall,
-                name,
-                rate_hz=force.rate_hz,
-                damping_n_s_per_m=force.damping.value,
-                delay_s=1e-3 * force.delay_ms.value,
-            )
+            _check_passive(force, wall, name)
 
 
 def _force(rig: RigFile) -> ForceSection:
@@ -117,6 +112,29 @@ def _check_within(rig: RigFile, force: ForceSection, wall: Wall, name: str) -> N
                     f"{axis} = {at:.0f} mm (from {low:g} to {high:g} mm); make it smaller, or "
                     "change its height or the pose."
                 )
+
+
+def _check_passive(force: ForceSection, wall: Wall, name: str) -> None:
+    """Refuse a wall that is stiffer than is passive, and say how stiff it may be."""
+    largest = largest_of(force, wall_damping_n_s_per_m=wall.damping_n_s_per_m)
+    if wall.stiffness_n_per_mm <= largest:
+        return
+    raise InputError(
+        f"expected {name} to be passive on this device, got {wall.stiffness_n_per_mm:g} N/mm with "
+        f"a damper of {wall.damping_n_s_per_m:g} N·s/m; "
+        + (
+            f"at most {_floored(largest):g} N/mm holds, or give --override with a reason, which is "
+            "stored."
+            if largest > 0
+            else f"its damper may have less than the device's own {force.damping.value:g} N·s/m."
+        )
+    )
+
+
+def _floored(value: float) -> float:
+    """To four digits, and never more than it is."""
+    rounded = float(f"{value:.4g}")
+    return rounded if rounded <= value else float(f"{value * (1 - 1e-4):.4g}")
 
 
 def in_device(rig: RigFile, point_mm: Millimetres) -> Millimetres:

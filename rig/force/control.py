@@ -42,12 +42,6 @@ class Control:
         return self._figure(self._lib.TQ_WORD_TICK)
 
     @property
-    def force_n(self) -> tuple[float, float, float]:
-        """What the servo commanded last, in the device's frame."""
-        first = self._lib.TQ_WORD_FORCE
-        return self._figure(first), self._figure(first + 1), self._figure(first + 2)
-
-    @property
     def depth_mm(self) -> float:
         """Of the tool below the wall's height; negative above."""
         return self._figure(self._lib.TQ_WORD_DEPTH)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from math import inf
 
 from modeling.checks import check_number
-from modeling.errors import InputError
 
 STIFFEST_N_PER_MM = 20.0
 LARGEST_MM = 1000.0
@@ -80,38 +79,3 @@ def largest_stiffness_n_per_mm(
     """
     left = damping_n_s_per_m - abs(wall_damping_n_s_per_m)
     return 1e-3 * left / (0.5 / rate_hz + delay_s) if rate_hz < inf else inf
-
-
-def check_passive(
-    wall: Wall, where: str, *, rate_hz: float, damping_n_s_per_m: float, delay_s: float
-) -> None:
-    """Refuse a wall that is stiffer than `largest_stiffness_n_per_mm`, which the sentence states.
-
-    Raises
-    ------
-    InputError
-    """
-    largest = largest_stiffness_n_per_mm(
-        rate_hz=rate_hz,
-        damping_n_s_per_m=damping_n_s_per_m,
-        delay_s=delay_s,
-        wall_damping_n_s_per_m=wall.damping_n_s_per_m,
-    )
-    if wall.stiffness_n_per_mm <= largest:
-        return
-    raise InputError(
-        f"expected {where} to be passive on this device, got {wall.stiffness_n_per_mm:g} N/mm with "
-        f"a damper of {wall.damping_n_s_per_m:g} N·s/m; "
-        + (
-            f"at most {_floored(largest):g} N/mm holds, or give --override with a reason, which is "
-            "stored."
-            if largest > 0
-            else f"its damper may have less than the device's own {damping_n_s_per_m:g} N·s/m."
-        )
-    )
-
-
-def _floored(value: float) -> float:
-    """To four digits, and never more than it is."""
-    rounded = float(f"{value:.4g}")
-    return rounded if rounded <= value else float(f"{value * (1 - 1e-4):.4g}")
