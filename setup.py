@@ -3,7 +3,7 @@
 import numpy
 from setuptools import Extension, setup
 
-PARTS = ("kernel", "kernel_single", "many", "slopes", "rivals", "live", "standin")
+PARTS = ("kernel", "kernel_single", "many", "slopes", "rivals", "live", "standin", "device")
 
 ABI = "0x030B0000"  # the stable interface as of Python 3.11: one wheel for all later ones
 

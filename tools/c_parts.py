@@ -4,7 +4,8 @@
 `_many` renders many streams side by side, `modeling.estimation._slopes` is what the fit of layers
 spends its time on, `benches.rendering._rivals` is what the bench compares,
 `rig.live._live` is the memory that processes of a rig share, the callback that plays and the servo
-of a force device, `rig.force._standin` a stand-in for the library of its maker.
+of a force device, `rig.force._standin` a stand-in for the library of its maker, `rig.device._device`
+the firmware on a simulated board.
 """
 
 from __future__ import annotations
@@ -26,9 +27,11 @@ PLAYER = ROOT / "modeling" / "rendering" / "player.h"
 LIVE = ROOT / "rig" / "live" / "live.h"
 SOUND = ROOT / "rig" / "live" / "sound.h"
 BACKEND = ROOT / "rig" / "force" / "backend.h"
+DHD = ROOT / "rig" / "force" / "dhd.h"
 FORCE = ROOT / "rig" / "force" / "force.h"
 STROKE = ROOT / "rig" / "force" / "stroke.h"
 SERVO = ROOT / "rig" / "force" / "servo.h"
+DEVICE = ROOT / "rig" / "device"
 STANDIN = ROOT / "rig" / "force" / "standin.h"
 # For GCC and Clang. A multiplication contracted with an addition would round otherwise than Python.
 COMPILER_ARGUMENTS = ["-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno"]
@@ -97,7 +100,8 @@ def live_binding() -> FFI:
     builder.cdef(
         "\n".join(
             (
-                "typedef double tq_real; static const int TQ_KEPT, TQ_KEPT_DOUBLED, TQ_LANES;",
+                "typedef double tq_real; typedef double tq_number;",
+                "static const int TQ_KEPT, TQ_KEPT_DOUBLED, TQ_LANES;",
                 "static const int TQ_RING, TQ_ROWS, TQ_STATES, TQ_EVENTS, TQ_CAUSES;",
                 "static const int TQ_WORD_ASKED, TQ_WORD_WALL, TQ_WORD_PRESS, TQ_WORD_TICK;",
                 "static const int TQ_WORD_TICKS, TQ_WORD_STATE, TQ_WORD_FORCE, TQ_WORD_DEPTH;",
@@ -111,13 +115,14 @@ def live_binding() -> FFI:
                 declarations(LIVE),
                 declarations(SOUND),
                 declarations(BACKEND),
+                declarations(DHD),
                 declarations(FORCE),
                 declarations(STROKE),
                 declarations(SERVO),
             )
         )
     )
-    headers = (KERNEL, LATTICE, PLAYER, LIVE, SOUND, BACKEND, FORCE, STROKE, SERVO)
+    headers = (KERNEL, LATTICE, PLAYER, LIVE, SOUND, BACKEND, DHD, FORCE, STROKE, SERVO)
     builder.set_source(
         "rig.live._live",
         f'#include "{SOUND.name}"\n#include "{SERVO.name}"',
@@ -147,5 +152,35 @@ def standin_binding() -> FFI:
     return builder
 
 
+def device_binding() -> FFI:
+    """The builder of `rig.device._device`: the firmware on a simulated board."""
+    header = DEVICE / "virtual.h"
+    inner = ("backend.h", "force.h", "kernel.h", "scene.h")
+    others = ("cables.h", "device.h", "model.h", "registers.h", "simulated.h", "wire.h")
+    builder = FFI()
+    builder.cdef("typedef struct tq_virtual tq_virtual;")
+    public = r"^static (?:inline )?(\w[^;{}=]*?tq_virtual_(?:%s)\([^)]*\))(?=\s*\{)"
+    names = "size|start|receive|step|take|run"
+    found = re.findall(public % names, header.read_text("utf-8"), re.MULTILINE)
+    builder.cdef("\n".join(f"{call};" for call in dict.fromkeys(found)))
+    folders = [DEVICE, FORCE.parent, KERNEL.parent]
+    builder.set_source(
+        "rig.device._device",
+        f'#include "{header.name}"',
+        include_dirs=[str(folder) for folder in folders],
+        depends=[
+            str(folder / name)
+            for folder in folders
+            for name in (*inner, *others, header.name)
+            if (folder / name).exists()
+        ],
+        define_macros=[("_GNU_SOURCE", None)],
+        extra_compile_args=COMPILER_ARGUMENTS,
+        optional=True,
+    )
+    return builder
+
+
 live = live_binding()
 standin = standin_binding()
+device = device_binding()

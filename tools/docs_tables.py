@@ -1,4 +1,5 @@
-"""Write what follows from declarations: tables of keys and columns in docs/, and JSON Schemas.
+"""Write what follows from declarations: tables of keys and columns in docs/, JSON Schemas, and what
+a device's definition gives.
 
     python tools/docs_tables.py    # or make docs-tables
 
@@ -24,8 +25,10 @@ from modeling.perception import thresholds  # noqa: E402
 from modeling.recordings import recording_set, trajectory  # noqa: E402
 from modeling.scenes import microcontrollers  # noqa: E402
 from rig.capture import pieces  # noqa: E402
+from rig.device.definition import DEVICE  # noqa: E402
 from rig.hand import scripted  # noqa: E402
 from rig.importing import labels  # noqa: E402
+from rig.wire import generating  # noqa: E402
 from tactileq.commands.schema import declared  # noqa: E402
 
 TABLES = {
@@ -53,6 +56,7 @@ PAGES = (
     "docs/study-file.md",
     "docs/saved-files.md",
     "docs/data.md",
+    "docs/device-registers.md",
 )
 SCHEMAS = {
     "modeling/scenes/shipped/scene.schema.json": "scene",
@@ -60,9 +64,18 @@ SCHEMAS = {
     "rig/setup/rig.schema.json": "rig",
     "experiments/study/study.schema.json": "study",
 }
+DEVICE_FILES = {
+    "rig/device/registers.h": generating.c_header,
+    "rig/device/registers.py": generating.python_module,
+    "docs/device/vectors.json": generating.vectors,
+}
 _MADE = {
     "keys": lambda name: key_tables(declared(name)),
     "table": lambda name: markdown(TABLES[name]).rstrip("\n"),
+    "device": lambda name: {
+        "registers": generating.register_table,
+        "masks": generating.mask_tables,
+    }[name](DEVICE),
 }
 _MARKED = re.compile(r"(<!-- (\w+): (\S+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
@@ -75,9 +88,11 @@ def page(text: str) -> str:
 def generated() -> dict[str, str]:
     """What every page and schema should hold, by its path."""
     pages = {path: page((ROOT / path).read_text(encoding="utf-8")) for path in PAGES}
-    return pages | {path: schema_text(declared(name)) for path, name in SCHEMAS.items()}
+    pages |= {path: schema_text(declared(name)) for path, name in SCHEMAS.items()}
+    return pages | {path: made(DEVICE) for path, made in DEVICE_FILES.items()}
 
 
 if __name__ == "__main__":
     for path, text in generated().items():
+        (ROOT / path).parent.mkdir(exist_ok=True)
         (ROOT / path).write_text(text, encoding="utf-8")

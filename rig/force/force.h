@@ -43,53 +43,53 @@ static inline int tq_force_next(int state, int event)
 
 /* Limits of one device, and where its wall's frame lies. */
 typedef struct {
-    double late_s;       /* two readings further apart than this are a fault */
-    double frozen_s;     /* so are bit-identical ones for this long under force */
-    double release_s;    /* from the force at a fault to 0 */
-    double show_s;       /* from no wall to all of it where it is switched on while it is penetrated */
-    double most_n;       /* force */
-    double most_n_per_s; /* its change */
-    double most_w;       /* its power, into the hand or out of it */
-    double most_mm_s;    /* speed of the tool; above, a fault */
-    double jump_mm;      /* a step of readings longer than speed allows by this much is a fault */
-    double velocity_hz;  /* corner of the low-pass on the velocity of the wall's damping */
-    double low_mm[3], high_mm[3]; /* workspace, in the device's frame */
-    double origin_mm[3];          /* of the wall's frame, in the device's */
-    double axes[9];               /* its unit vectors x, y and z (away from the surface) there */
+    tq_number late_s;       /* two readings further apart than this are a fault */
+    tq_number frozen_s;     /* so are bit-identical ones for this long under force */
+    tq_number release_s;    /* from the force at a fault to 0 */
+    tq_number show_s;       /* from no wall to all of it where it is switched on while it is penetrated */
+    tq_number most_n;       /* force */
+    tq_number most_n_per_s; /* its change */
+    tq_number most_w;       /* its power, into the hand or out of it */
+    tq_number most_mm_s;    /* speed of the tool; above, a fault */
+    tq_number jump_mm;      /* a step of readings longer than speed allows by this much is a fault */
+    tq_number velocity_hz;  /* corner of the low-pass on the velocity of the wall's damping */
+    tq_number low_mm[3], high_mm[3]; /* workspace, in the device's frame */
+    tq_number origin_mm[3];          /* of the wall's frame, in the device's */
+    tq_number axes[9];               /* its unit vectors x, y and z (away from the surface) there */
 } tq_force_limits;
 
 /* A spring-damper wall: a rectangle about the origin of its frame, felt from above. */
 typedef struct {
-    double height_mm, stiffness_n_per_mm, damping_n_s_per_mm;
-    double half_x_mm, half_y_mm;
+    tq_number height_mm, stiffness_n_per_mm, damping_n_s_per_mm;
+    tq_number half_x_mm, half_y_mm;
 } tq_wall;
 
 /* All of it between two ticks; what is read from outside stands first. */
 typedef struct {
-    double command_n[3];   /* what the device shall push with, in its frame */
-    double normal_n;       /* the same along the wall's z */
-    double position_mm[3]; /* in the wall's frame */
-    double velocity_mm_s[3];
-    double depth_mm;       /* below the wall's height; negative above */
+    tq_number command_n[3];   /* what the device shall push with, in its frame */
+    tq_number normal_n;       /* the same along the wall's z */
+    tq_number position_mm[3]; /* in the wall's frame */
+    tq_number velocity_mm_s[3];
+    tq_number depth_mm;       /* below the wall's height; negative above */
     int state, cause;
     int beyond;            /* the wall is shown, and the tool below its height but not on it */
     /* Its own. */
     tq_force_limits limits;
     tq_wall wall;
-    double scale;     /* how much of the wall is there, 0 to 1 */
-    double press_n;   /* pushes into the surface, to measure it */
-    double frozen_s, fell_n;
-    double raw_mm[3]; /* the last reading */
+    tq_number scale;     /* how much of the wall is there, 0 to 1 */
+    tq_number press_n;   /* pushes into the surface, to measure it */
+    tq_number frozen_s, fell_n;
+    tq_number raw_mm[3]; /* the last reading */
     int sensed;       /* whether there is one */
     int engaged;      /* whether the tool came onto the wall from above */
 } tq_force;
 
-static inline double tq_force_size(double x)
+static inline tq_number tq_force_size(tq_number x)
 {
     return x < 0 ? -x : x;
 }
 
-static inline double tq_force_limited(double x, double most)
+static inline tq_number tq_force_limited(tq_number x, tq_number most)
 {
     return x > most ? most : x < -most ? -most : x;
 }
@@ -127,15 +127,15 @@ static inline void tq_force_set_wall(tq_force *f, const tq_wall *wall)
 }
 
 /* What is wrong with a reading that comes `step_s` after the one before; TQ_NO_CAUSE for nothing. */
-static inline int tq_force_wrong(tq_force *f, const tq_sensed *sensed, double step_s)
+static inline int tq_force_wrong(tq_force *f, const tq_sensed *sensed, tq_number step_s)
 {
     const tq_force_limits *l = &f->limits;
-    double moved = 0, allowed;
+    tq_number moved = 0, allowed;
     int n, same = f->sensed;
     if (sensed->failed)
         return TQ_NOT_READ;
     for (n = 0; n < 3; n++) {
-        double x = sensed->position_mm[n];
+        tq_number x = sensed->position_mm[n];
         if (!(x - x == 0)) /* neither a number nor finite */
             return TQ_NOT_A_NUMBER;
         moved += (x - f->raw_mm[n]) * (x - f->raw_mm[n]);
@@ -156,14 +156,14 @@ static inline int tq_force_wrong(tq_force *f, const tq_sensed *sensed, double st
 }
 
 /* Where the tool is in the wall's frame, and how fast. */
-static inline void tq_force_follow(tq_force *f, const tq_sensed *sensed, double step_s)
+static inline void tq_force_follow(tq_force *f, const tq_sensed *sensed, tq_number step_s)
 {
     const tq_force_limits *l = &f->limits;
-    double tau_s = 0.15915494309189535 / l->velocity_hz;
-    double share = step_s > 0 ? step_s / (tau_s + step_s) : 0;
+    tq_number tau_s = (tq_number)0.15915494309189535 / l->velocity_hz;
+    tq_number share = step_s > 0 ? step_s / (tau_s + step_s) : 0;
     int n, k;
     for (n = 0; n < 3; n++) {
-        double x = 0;
+        tq_number x = 0;
         for (k = 0; k < 3; k++)
             x += l->axes[3 * n + k] * (sensed->position_mm[k] - l->origin_mm[k]);
         if (f->sensed && step_s > 0)
@@ -180,11 +180,11 @@ static inline void tq_force_follow(tq_force *f, const tq_sensed *sensed, double 
 
 /* Force of the wall, along z: never adhesive, none beyond its edge, and none for who came under it from
    beside it before having been above it. */
-static inline double tq_wall_force(tq_force *f, double step_s)
+static inline tq_number tq_wall_force(tq_force *f, tq_number step_s)
 {
     int inside = tq_force_size(f->position_mm[0]) <= f->wall.half_x_mm
                  && tq_force_size(f->position_mm[1]) <= f->wall.half_y_mm;
-    double wanted = f->state == TQ_RUNNING ? 1 : 0, most = step_s / f->limits.show_s, force;
+    tq_number wanted = f->state == TQ_RUNNING ? 1 : 0, most = step_s / f->limits.show_s, force;
     f->scale += tq_force_limited(wanted - f->scale, most);
     f->engaged = f->depth_mm <= 0 || (f->engaged && inside);
     f->beyond = f->state == TQ_RUNNING && f->depth_mm > 0 && !f->engaged;
@@ -196,23 +196,23 @@ static inline double tq_wall_force(tq_force *f, double step_s)
 }
 
 /* Within the limits of force, its change and its power, of which the last one comes first. */
-static inline double tq_force_clamped(const tq_force *f, double force, double step_s)
+static inline tq_number tq_force_clamped(const tq_force *f, tq_number force, tq_number step_s)
 {
     const tq_force_limits *l = &f->limits;
-    double speed = tq_force_size(f->velocity_mm_s[2]);
+    tq_number speed = tq_force_size(f->velocity_mm_s[2]);
     force = tq_force_limited(force, l->most_n);
     force = f->normal_n + tq_force_limited(force - f->normal_n, l->most_n_per_s * step_s);
-    if (tq_force_size(force) * speed > 1e3 * l->most_w)
-        force = tq_force_limited(force, 1e3 * l->most_w / speed);
+    if (tq_force_size(force) * speed > (tq_number)1e3 * l->most_w)
+        force = tq_force_limited(force, (tq_number)1e3 * l->most_w / speed);
     return force;
 }
 
 /* One tick: takes in a reading that was made `step_s` after the one before, and sets the command. */
-static inline void tq_force_tick(tq_force *f, const tq_sensed *sensed, double step_s)
+static inline void tq_force_tick(tq_force *f, const tq_sensed *sensed, tq_number step_s)
 {
     const tq_force_limits *l = &f->limits;
     int wrong = tq_force_wrong(f, sensed, step_s), n;
-    double least_s = step_s > 0 ? (step_s < l->late_s ? step_s : l->late_s) : 0, force = 0, speed = 0;
+    tq_number least_s = step_s > 0 ? (step_s < l->late_s ? step_s : l->late_s) : 0, force = 0, speed = 0;
     if (wrong == TQ_NO_CAUSE) {
         tq_force_follow(f, sensed, step_s);
         for (n = 0; n < 3; n++)
@@ -228,7 +228,8 @@ static inline void tq_force_tick(tq_force *f, const tq_sensed *sensed, double st
             force -= f->press_n;
         force = tq_force_clamped(f, force, least_s);
     } else if (f->state == TQ_RELEASING) { /* also without a reading: linearly to 0 */
-        double part = tq_force_size(f->fell_n) * (least_s > 1e-4 ? least_s : 1e-4) / l->release_s;
+        const tq_number shortest_s = (tq_number)1e-4;
+        tq_number part = tq_force_size(f->fell_n) * (least_s > shortest_s ? least_s : shortest_s) / l->release_s;
         force = f->normal_n - tq_force_limited(f->normal_n, part);
     }
     f->normal_n = force;
@@ -238,6 +239,14 @@ static inline void tq_force_tick(tq_force *f, const tq_sensed *sensed, double st
         f->scale = f->press_n = 0, f->engaged = 0;
     for (n = 0; n < 3; n++)
         f->command_n[n] = force * l->axes[6 + n];
+}
+
+/* Up to which stiffness (N/mm) a wall that is sampled every `period_s` and answered `delay_s` later cannot
+   give energy to the hand; `rig.force.wall` has the source. */
+static inline tq_number tq_largest_stiffness(tq_number device_n_s_per_mm, tq_number wall_n_s_per_mm,
+                                             tq_number period_s, tq_number delay_s)
+{
+    return (device_n_s_per_mm - tq_force_size(wall_n_s_per_mm)) / (period_s / 2 + delay_s);
 }
 
 #endif

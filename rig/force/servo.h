@@ -9,6 +9,7 @@
 #ifndef TQ_SERVO_H
 #define TQ_SERVO_H
 
+#include "dhd.h"
 #include "force.h"
 #include "live.h"
 #include "stroke.h"

@@ -1,0 +1,868 @@
+/* The device: what its firmware does at every tick, and with every byte that comes. docs/device.md
+
+   Two places call it: an interrupt (or a loop) 5000 times a second calls tq_device_tick; whenever there
+   are bytes, and else at leisure, the main loop calls tq_device_received and tq_device_poll. What both
+   touch is touched between board->lock and board->unlock. No allocation, no clock but its ticks, no globals:
+   the same file runs behind a pseudo-terminal, in virtual time and on a micro-controller. C99.
+
+   Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
+
+#ifndef TQ_DEVICE_H
+#define TQ_DEVICE_H
+
+#include "cables.h"
+#include "force.h"
+#include "model.h"
+#include "registers.h"
+#include "wire.h"
+
+#define TQ_TICK_HZ 5000
+enum {
+    TQ_READ_TICKS = 5,                   /* from one reading of the hand to the next: 1 ms */
+    TQ_LINK_TICKS = TQ_TICK_HZ / 10,     /* a host that says nothing for so long is gone */
+    TQ_BEAT_TICKS = TQ_TICK_HZ,          /* and so is its control loop */
+    TQ_FLUSH_TICKS = TQ_TICK_HZ / 500,   /* a record waits no longer for others of its frame */
+    TQ_RECORDS = 64, TQ_PER_FRAME = 10, TQ_RECORD_BYTES = 21, TQ_EVENT_HEADER = 11,
+    TQ_SAMPLES = 1024, TQ_MOST_QUEUED = 1000,
+    TQ_TAPS = 20,                        /* of the tracking filter: twice its delay of 10 ms */
+    TQ_OUTPUTS = 3, TQ_VIBRATOR = 2
+};
+
+/* What is written for a board. docs/device.md#porting */
+typedef struct {
+    void *context;
+    /* A motor's current (A) or the vibrator's acceleration (g) from now on; not 0 where that failed. */
+    int (*write)(void *context, int output, tq_number value);
+    /* Bytes that can be sent at once, and sending them. */
+    size_t (*room)(void *context);
+    void (*send)(void *context, const uint8_t *bytes, size_t count);
+    /* Keep the tick from coming in between. */
+    void (*lock)(void *context);
+    void (*unlock)(void *context);
+    tq_cables cables;
+    uint32_t entropy; /* differs from one start to the next */
+    uint32_t baud;    /* of the port; 0 where it has none */
+    int simulated;    /* whether there is no hand */
+} tq_board;
+
+typedef struct {
+    uint32_t number, tick;
+    float x_mm, depth_mm, speed_mm_s, force_n, vibration_g;
+    uint8_t flags;
+} tq_record;
+
+typedef struct {
+    tq_board board;
+    tqd_values values;
+    tq_force force;
+    /* The link. */
+    tq_reader reader;
+    uint32_t nonce, heard, beat;
+    int greeted;
+    uint16_t expected, replied;   /* sequence of the next frame, check of the last one */
+    uint8_t reply[TQ_MOST_STUFFED];
+    size_t reply_bytes;
+    /* The encoders. */
+    uint16_t counts[TQ_MOTORS];
+    int32_t counted[TQ_MOTORS], still[TQ_MOTORS]; /* since home; at the last move of each encoder */
+    int counting, homed;
+    tq_number length_mm[TQ_MOTORS];
+    /* Speed along x: the tracking filter on one position in a millisecond. */
+    float track_mm[TQ_TAPS + 1], weights[TQ_TAPS];
+    int tracked;
+    /* Currents and what they heat. */
+    tq_number current_a[TQ_MOTORS], heat_a2_s[TQ_MOTORS];
+    int clipped, failing, releasing;
+    /* The vibration. */
+    tq_upload uploads[2];
+    tq_texture textures[2];
+    uint64_t hashes[2];
+    tq_scene scene;
+    tq_scene_hand hand;
+    tq_real memory[TQ_MEMORY(TQ_MOST_LAYERS + 1, 0)];
+    int playing, slot; /* whether there is a model; which upload is being filled, -1 for none */
+    uint32_t upload_bytes, upload_count;
+    uint64_t switches;
+    float samples[TQ_SAMPLES];
+    uint32_t samples_in, samples_out;
+    tq_number vibration_g;
+    /* Records, from the tick to the main loop. */
+    tq_record records[TQ_RECORDS];
+    volatile uint32_t records_in, records_out;
+    uint32_t record_number, record_every;
+    /* Clocks that ticks took. */
+    uint32_t clocks_ticks, clocks_sum, clocks_most;
+    int simulate; /* what a simulated board has to do next, -1 for nothing */
+} tq_device;
+
+static inline size_t tq_device_size(void)
+{
+    return sizeof(tq_device);
+}
+
+/* --- Start ---------------------------------------------------------------------------------------- */
+
+/* Integral of the tracking filter's weight up to here; rig/hand/tracking.py. */
+static inline float tq_smooth(float share)
+{
+    return share * share * (3 - 2 * share);
+}
+
+static inline void tq_device_defaults(tq_device *d)
+{
+    tqd_values *v = &d->values;
+    v->who_am_i = TQD_WHO_AM_I_VALUE, v->firmware_version = TQD_FIRMWARE_VERSION_VALUE;
+    v->schema_hash = TQD_SCHEMA_HASH_VALUE;
+    v->tick_rate = TQ_TICK_HZ, v->real_size = sizeof(tq_real), v->most_layers = TQ_MOST_LAYERS;
+    v->model_capacity = sizeof d->uploads[0].bytes;
+    v->wall[0] = 0, v->wall[1] = 1, v->wall[2] = 0, v->wall[3] = 100, v->wall[4] = 300;
+    v->force_limit = 5, v->force_slew = 2000, v->power_limit = 5, v->speed_limit = 1000;
+    v->workspace[0] = -210, v->workspace[1] = 210, v->workspace[2] = -60, v->workspace[3] = -5;
+    v->current_limit = 6, v->heat_limit = 20, v->vibration_limit = 5;
+    v->tension_range[0] = 0.2f, v->tension_range[1] = 16;
+    v->contact_force = 0.05f;
+    v->stroke[0] = 60, v->stroke[1] = 0.5f, v->stroke[2] = 4;
+}
+
+/* The limits of the law, from the registers. */
+static inline void tq_device_limit(tq_device *d)
+{
+    tq_force_limits *l = &d->force.limits;
+    const tqd_values *v = &d->values;
+    int n;
+    memset(l, 0, sizeof *l);
+    l->late_s = 1, l->frozen_s = (tq_number)0.25, l->release_s = (tq_number)0.02, l->show_s = (tq_number)0.2;
+    l->most_n = v->force_limit, l->most_n_per_s = v->force_slew, l->most_w = v->power_limit;
+    l->most_mm_s = v->speed_limit, l->jump_mm = 1, l->velocity_hz = 100;
+    l->low_mm[0] = v->workspace[0], l->high_mm[0] = v->workspace[1];
+    l->low_mm[1] = -1, l->high_mm[1] = 1;
+    l->low_mm[2] = v->workspace[2], l->high_mm[2] = v->workspace[3];
+    l->origin_mm[2] = -50;
+    for (n = 0; n < 3; n++)
+        l->axes[4 * n] = 1;
+}
+
+/* The tool stands in its rest: the counters start from the lengths that the cables have there. */
+static inline void tq_device_home(tq_device *d)
+{
+    int n;
+    for (n = 0; n < TQ_MOTORS; n++)
+        d->counted[n] = d->still[n] = 0;
+    d->homed = 1, d->force.sensed = 0, d->tracked = 0;
+}
+
+/* Everything off, without force, and nothing greeted. */
+static inline void tq_device_start(tq_device *d, const tq_board *board)
+{
+    tq_force_limits none;
+    int n;
+    memset(d, 0, sizeof *d);
+    d->board = *board;
+    d->slot = d->simulate = -1;
+    tq_device_defaults(d);
+    memset(&none, 0, sizeof none);
+    tq_force_start(&d->force, &none);
+    tq_device_limit(d);
+    tq_device_home(d);
+    d->homed = 0;
+    for (n = 0; n < TQ_TAPS; n++)
+        d->weights[n] = (tq_smooth((float)(n + 1) / TQ_TAPS) - tq_smooth((float)n / TQ_TAPS))
+                        * (float)(TQ_TICK_HZ / TQ_READ_TICKS);
+    d->values.stiffness_limit = (float)tq_largest_stiffness(
+        board->cables.damping_n_s_per_mm, 0, (tq_number)1 / TQ_TICK_HZ, (tq_number)1 / TQ_TICK_HZ);
+    d->values.state = (uint8_t)d->force.state;
+}
+
+/* --- The tick: force ------------------------------------------------------------------------------ */
+
+/* Each output is told 0, whatever the ones before it said; the first that failed is reported. */
+static inline void tq_device_shut(tq_device *d)
+{
+    int n, error = 0;
+    for (n = 0; n < TQ_OUTPUTS; n++)
+        if (d->board.write(d->board.context, n, 0) && !error)
+            error = n + 1;
+    d->values.shutdown_error = (uint8_t)error;
+}
+
+static inline void tq_device_count(tq_device *d, const uint16_t counts[TQ_MOTORS])
+{
+    int n;
+    for (n = 0; n < TQ_MOTORS; n++) {
+        uint16_t moved = d->counting ? (uint16_t)(counts[n] - d->counts[n]) : 0;
+        d->counted[n] += moved < 0x8000 ? (int32_t)moved : (int32_t)moved - 0x10000; /* modulo 2^16 */
+        d->counts[n] = counts[n];
+        d->length_mm[n] = tq_cable_length(&d->board.cables, n, d->board.cables.rest_x_mm,
+                                          d->board.cables.rest_z_mm)
+                          + (tq_number)d->counted[n] * d->board.cables.mm_per_count;
+    }
+    d->counting = 1;
+}
+
+/* Whether one encoder has stood still while the other one went on for 3 mm. */
+static inline int tq_device_stuck(tq_device *d)
+{
+    const tq_number most = 3 / tq_force_size(d->board.cables.mm_per_count);
+    tq_number moved[TQ_MOTORS];
+    int n;
+    for (n = 0; n < TQ_MOTORS; n++)
+        moved[n] = tq_force_size((tq_number)(d->counted[n] - d->still[n]));
+    if ((moved[0] == 0 && moved[1] > most) || (moved[1] == 0 && moved[0] > most))
+        return 1;
+    if (moved[0] != 0 && moved[1] != 0)
+        for (n = 0; n < TQ_MOTORS; n++)
+            d->still[n] = d->counted[n];
+    return 0;
+}
+
+static inline void tq_device_sense(tq_device *d, int button, tq_sensed *sensed)
+{
+    tq_number x = 0, z = 0;
+    memset(sensed, 0, sizeof *sensed);
+    sensed->failed = !tq_cables_place(&d->board.cables, d->length_mm, &x, &z);
+    sensed->position_mm[0] = x, sensed->position_mm[2] = z;
+    sensed->button = button;
+}
+
+/* Lets go where the host is gone, or its control loop, or an encoder. */
+static inline void tq_device_mind(tq_device *d)
+{
+    uint32_t now = d->values.tick;
+    int stuck = tq_device_stuck(d);
+    if (d->force.state != TQ_ARMED && d->force.state != TQ_RUNNING)
+        return;
+    if (now - d->heard > TQ_LINK_TICKS)
+        tq_force_event(&d->force, TQ_FAILED, TQD_CAUSE_LINK);
+    else if (now - d->beat > TQ_BEAT_TICKS)
+        tq_force_event(&d->force, TQ_FAILED, TQD_CAUSE_HEARTBEAT);
+    else if (stuck)
+        tq_force_event(&d->force, TQ_FAILED, TQD_CAUSE_STUCK);
+}
+
+/* Currents for the force that was decided; none in a state without force. */
+static inline void tq_device_pull(tq_device *d)
+{
+    const tq_cables *c = &d->board.cables;
+    const tqd_values *v = &d->values;
+    const tq_number step_s = (tq_number)1 / TQ_TICK_HZ;
+    int state = d->force.state, n;
+    int allowed = state == TQ_ARMED || state == TQ_RUNNING;
+    tq_number tension[TQ_MOTORS] = { 0, 0 }, most = 1, force = d->force.normal_n > 0 ? d->force.normal_n : 0;
+    if (allowed || state == TQ_RELEASING)
+        if (d->force.position_mm[2] < 49) /* z = -1 mm: below the motors */
+            tq_cables_tensions(c, d->length_mm, d->force.position_mm[0], d->force.position_mm[2] - 50, force,
+                               tension);
+    d->clipped = 0;
+    for (n = 0; n < TQ_MOTORS; n++) { /* both by one factor: the force keeps its direction */
+        tq_number bound = v->tension_range[1], current = v->current_limit;
+        if (d->heat_a2_s[n] >= (tq_number)v->heat_limit && current > c->nominal_a)
+            current = c->nominal_a;
+        if (bound > current * c->n_per_a)
+            bound = current * c->n_per_a;
+        if (tension[n] > bound) {
+            d->clipped = 1;
+            if (bound / tension[n] < most)
+                most = bound / tension[n];
+        }
+    }
+    for (n = 0; n < TQ_MOTORS; n++) {
+        tq_number current, over;
+        tension[n] *= most;
+        if (allowed && tension[n] < (tq_number)v->tension_range[0])
+            tension[n] = v->tension_range[0];
+        current = tension[n] / c->n_per_a;
+        if (current > (tq_number)v->current_limit)
+            current = v->current_limit;
+        d->current_a[n] = current;
+        over = (current * current - c->nominal_a * c->nominal_a) * step_s;
+        d->heat_a2_s[n] = d->heat_a2_s[n] + over > 0 ? d->heat_a2_s[n] + over : 0;
+        d->values.tension[n] = (float)(current * c->n_per_a);
+        d->values.current[n] = (float)current, d->values.heat[n] = (float)d->heat_a2_s[n];
+    }
+}
+
+/* Notes when it let go, and when nothing pulled any more; shuts every output then. */
+static inline void tq_device_note(tq_device *d, int before)
+{
+    int state = d->force.state;
+    if ((before == TQ_ARMED || before == TQ_RUNNING) && (state == TQ_RELEASING || state == TQ_FAULT)) {
+        d->values.fault_tick = d->values.tick;
+        d->values.heard_tick = d->heard;
+        d->releasing = 1;
+    }
+    if (state == TQ_FAULT && d->releasing) {
+        d->releasing = 0;
+        d->values.zero_tick = d->values.tick;
+        tq_device_shut(d);
+    }
+}
+
+static inline void tq_device_act(tq_device *d)
+{
+    int failed = 0, n;
+    for (n = 0; n < TQ_MOTORS; n++)
+        failed |= d->board.write(d->board.context, n, d->current_a[n]);
+    failed |= d->board.write(d->board.context, TQ_VIBRATOR, d->vibration_g);
+    d->failing = failed;
+}
+
+/* --- The tick: vibration --------------------------------------------------------------------------- */
+
+/* Speed along x by the tracking filter, once in a millisecond. */
+static inline float tq_device_speed(tq_device *d)
+{
+    float speed = 0;
+    int n;
+    if (!d->tracked)
+        for (n = 0; n <= TQ_TAPS; n++)
+            d->track_mm[n] = (float)d->force.position_mm[0];
+    d->tracked = 1;
+    for (n = 0; n < TQ_TAPS; n++) {
+        d->track_mm[n] = d->track_mm[n + 1];
+        if (n)
+            speed += (d->track_mm[n] - d->track_mm[n - 1]) * d->weights[n - 1];
+    }
+    d->track_mm[TQ_TAPS] = (float)d->force.position_mm[0];
+    return speed + (d->track_mm[TQ_TAPS] - d->track_mm[TQ_TAPS - 1]) * d->weights[TQ_TAPS - 1];
+}
+
+static inline float tq_device_model_sample(tq_device *d, int reads)
+{
+    tq_real sample = 0;
+    if (!d->playing)
+        return 0;
+    if (reads)
+        tq_scene_read(&d->hand, 0, d->values.speed, d->values.force);
+    tq_scene_render_on(&d->hand, &sample, 1);
+    if (d->hand.switches != d->switches) { /* the next model begins with this sample */
+        d->switches = d->hand.switches;
+        d->values.model_tick = d->values.tick;
+        d->values.model_hash = d->hashes[d->hand.now];
+    }
+    return (float)sample;
+}
+
+static inline float tq_device_host_sample(tq_device *d)
+{
+    if (d->samples_in != d->samples_out)
+        return d->samples[d->samples_out++ % TQ_SAMPLES];
+    if (d->values.source != TQD_SOURCE_HOST)
+        return 0;
+    d->values.samples_missed++;
+    return 0.9f * d->values.vibration; /* a step to 0 would be felt */
+}
+
+static inline int tq_device_plays(const tq_device *d, int source)
+{
+    return d->values.source == source;
+}
+
+/* The next sample. The model goes on in silence while something else is played. */
+static inline void tq_device_vibrate(tq_device *d, int reads)
+{
+    float model, sample = 0, most = d->values.vibration_limit;
+    if (reads) {
+        float newton = d->force.normal_n > 0 ? (float)d->force.normal_n : 0;
+        d->values.speed = tq_device_speed(d);
+        d->values.force = newton >= d->values.contact_force ? newton : 0;
+    }
+    model = tq_device_model_sample(d, reads);
+    if (tq_device_plays(d, TQD_SOURCE_MODEL))
+        sample = model;
+    else if (tq_device_plays(d, TQD_SOURCE_HOST))
+        sample = tq_device_host_sample(d);
+    if (!(sample - sample == 0)) /* not a number: never with a model that was checked */
+        sample = 0;
+    sample = sample > most ? most : sample < -most ? -most : sample;
+    d->values.vibration = sample, d->vibration_g = (tq_number)sample;
+}
+
+/* --- The tick: records ------------------------------------------------------------------------------ */
+
+static inline void tq_device_record(tq_device *d, int button)
+{
+    const tqd_values *v = &d->values;
+    tq_record *r;
+    uint32_t number = d->record_number;
+    if (!d->record_every || v->tick % d->record_every)
+        return;
+    d->record_number++;
+    if (d->records_in - d->records_out >= TQ_RECORDS) {
+        d->values.records_lost++;
+        return;
+    }
+    r = &d->records[d->records_in % TQ_RECORDS];
+    r->number = number, r->tick = v->tick;
+    r->x_mm = v->position[0], r->depth_mm = v->depth, r->speed_mm_s = v->speed, r->force_n = v->force;
+    r->vibration_g = v->vibration;
+    r->flags = (uint8_t)((v->force > 0 ? TQD_FLAGS_CONTACT : 0) | (button ? TQD_FLAGS_BUTTON : 0)
+                         | (d->clipped ? TQD_FLAGS_CLIPPED : 0) | (d->force.beyond ? TQD_FLAGS_BEYOND : 0)
+                         | (v->source == TQD_SOURCE_HOST && d->samples_in == d->samples_out
+                                ? TQD_FLAGS_EMPTY : 0)
+                         | (d->board.simulated ? TQD_FLAGS_SIMULATED : 0));
+    d->records_in++; /* after the record is whole: the main loop reads it then */
+}
+
+/* One tick: the encoders' counters, modulo 2^16, and the button. */
+static inline void tq_device_tick(tq_device *d, const uint16_t counts[TQ_MOTORS], int button)
+{
+    tq_sensed sensed;
+    tqd_values *v = &d->values;
+    int before = d->force.state;
+    tq_device_count(d, counts);
+    tq_device_sense(d, button, &sensed);
+    tq_device_mind(d);
+    if (d->failing && (d->force.state == TQ_ARMED || d->force.state == TQ_RUNNING))
+        tq_force_event(&d->force, TQ_FAILED, TQD_CAUSE_NOT_WRITTEN);
+    tq_force_tick(&d->force, &sensed, (tq_number)1 / TQ_TICK_HZ);
+    tq_device_pull(d);
+    v->position[0] = (float)sensed.position_mm[0], v->position[1] = (float)sensed.position_mm[2];
+    v->depth = (float)d->force.depth_mm, v->button = (uint8_t)button;
+    tq_device_vibrate(d, v->tick % TQ_READ_TICKS == 0);
+    v->state = (uint8_t)d->force.state, v->cause = (uint8_t)d->force.cause;
+    tq_device_act(d);
+    tq_device_note(d, before);
+    tq_device_record(d, button);
+    v->tick++;
+}
+
+/* How many of the board's clocks the last tick took. */
+static inline void tq_device_clocks(tq_device *d, uint32_t clocks)
+{
+    d->clocks_ticks++, d->clocks_sum += clocks;
+    if (clocks > d->clocks_most)
+        d->clocks_most = clocks;
+}
+
+/* --- Frames: replies --------------------------------------------------------------------------------- */
+
+static inline void tq_device_send(tq_device *d, const uint8_t *bytes, size_t count)
+{
+    if (d->board.room(d->board.context) >= count)
+        d->board.send(d->board.context, bytes, count);
+}
+
+/* Sends a reply, and keeps it: a frame that is repeated is answered again and done once. */
+static inline void tq_device_reply(tq_device *d, const tq_frame *f, int status, const uint8_t *body,
+                                   size_t count)
+{
+    uint8_t whole[TQ_MOST_BODY];
+    whole[0] = (uint8_t)status;
+    if (count)
+        memcpy(whole + 1, body, count);
+    if (status != TQD_STATUS_OK)
+        d->values.frames_refused++;
+    d->reply_bytes = tq_stuffed((uint8_t)(f->kind | TQ_REPLY), f->sequence, d->nonce, whole,
+                                (uint8_t)(count + 1), d->reply);
+    tq_device_send(d, d->reply, d->reply_bytes);
+}
+
+static inline const tqd_register *tq_device_register(uint8_t address)
+{
+    int n;
+    for (n = 0; n < TQD_REGISTERS; n++)
+        if (tqd_registers[n].address == address)
+            return &tqd_registers[n];
+    return NULL;
+}
+
+/* Whether every element of a value lies within its range. */
+static inline int tq_device_ranges(const tqd_register *r, const uint8_t *value)
+{
+    int n;
+    for (n = 0; n < r->length; n++) {
+        const tqd_range *range = &tqd_ranges[r->ranges + (r->each ? n : 0)];
+        float x = 0;
+        if (r->kind == TQD_FLOAT)
+            memcpy(&x, value + 4 * n, 4);
+        else if (r->bytes == 1)
+            x = value[n];
+        else if (r->bytes == 2)
+            x = (float)(value[2 * n] | value[2 * n + 1] << 8);
+        else
+            continue; /* all values of 32 and 64 bits are legal */
+        if (!(x >= range->low && x <= range->high))
+            return 0;
+    }
+    return 1;
+}
+
+/* --- Frames: commands -------------------------------------------------------------------------------- */
+
+static inline int tq_device_command(tq_device *d, int command)
+{
+    tq_force *f = &d->force;
+    int state = f->state, idle = state == TQ_BOOT || state == TQ_IDLE || state == TQ_FAULT;
+    tq_wall wall;
+    switch (command) {
+    case TQD_COMMAND_ARM:
+        if (state != TQ_IDLE || !d->homed)
+            return TQD_STATUS_STATE;
+        d->beat = d->values.tick;
+        tq_force_event(f, TQ_ARM, 0);
+        return TQD_STATUS_OK;
+    case TQD_COMMAND_SHOW:
+        if (state != TQ_ARMED && state != TQ_RUNNING)
+            return TQD_STATUS_STATE;
+        wall.height_mm = d->values.wall[0], wall.stiffness_n_per_mm = d->values.wall[1];
+        wall.damping_n_s_per_mm = d->values.wall[2];
+        wall.half_x_mm = d->values.wall[3], wall.half_y_mm = d->values.wall[4];
+        if (memcmp(&wall, &f->wall, sizeof wall))
+            tq_force_set_wall(f, &wall);
+        tq_force_event(f, TQ_SHOW, 0);
+        return TQD_STATUS_OK;
+    case TQD_COMMAND_HIDE:
+        if (state != TQ_RUNNING && state != TQ_ARMED)
+            return TQD_STATUS_STATE;
+        tq_force_event(f, TQ_HIDE, 0);
+        return TQD_STATUS_OK;
+    case TQD_COMMAND_CLEAR:
+        if (state != TQ_FAULT)
+            return TQD_STATUS_STATE;
+        tq_force_event(f, TQ_CLEAR, 0);
+        return TQD_STATUS_OK;
+    case TQD_COMMAND_STOP:
+        tq_force_event(f, TQ_FAILED, TQD_CAUSE_STOPPED);
+        return TQD_STATUS_OK;
+    case TQD_COMMAND_HOME:
+        if (!idle)
+            return TQD_STATUS_STATE;
+        tq_device_home(d);
+        return TQD_STATUS_OK;
+    default:
+        return TQD_STATUS_OK;
+    }
+}
+
+/* Whether so many records in a second divide the ticks, and fit through the port with a fifth to spare. */
+static inline int tq_device_carries(const tq_device *d, uint32_t rate)
+{
+    uint32_t frames = rate < TQ_TICK_HZ / TQ_FLUSH_TICKS ? rate : TQ_TICK_HZ / TQ_FLUSH_TICKS;
+    uint32_t bytes = rate * TQ_RECORD_BYTES + frames * (TQ_EVENT_HEADER + TQ_HEADER + 5);
+    if (rate && TQ_TICK_HZ % rate)
+        return 0;
+    return !d->board.baud || bytes <= d->board.baud / 10 / 5 * 4;
+}
+
+/* What a value must be beside its range. */
+static inline int tq_device_accepts(const tq_device *d, uint8_t address, const uint8_t *value)
+{
+    float x[5] = { 0, 0, 0, 0, 0 };
+    tq_number bound;
+    switch (address) {
+    case TQD_WALL:
+        memcpy(x, value, sizeof x);
+        bound = tq_largest_stiffness(d->board.cables.damping_n_s_per_mm, x[2], (tq_number)1 / TQ_TICK_HZ,
+                                     (tq_number)1 / TQ_TICK_HZ);
+        return x[1] > 0 && (tq_number)x[1] <= bound;
+    case TQD_WORKSPACE:
+        memcpy(x, value, 4 * sizeof x[0]);
+        return x[0] < x[1] && x[2] < x[3];
+    case TQD_TENSION_RANGE:
+        memcpy(x, value, 2 * sizeof x[0]);
+        return x[0] < x[1];
+    case TQD_EVENT_RATE:
+        return tq_device_carries(d, (uint32_t)(value[0] | value[1] << 8));
+    default:
+        return 1;
+    }
+}
+
+static inline int tq_device_queue(tq_device *d, const uint8_t *value, uint32_t count)
+{
+    uint32_t n;
+    if (d->samples_in - d->samples_out + count > TQ_MOST_QUEUED)
+        return TQD_STATUS_FULL;
+    for (n = 0; n < count; n++)
+        memcpy(&d->samples[(d->samples_in + n) % TQ_SAMPLES], value + 4 * n, 4);
+    d->samples_in += count;
+    return TQD_STATUS_OK;
+}
+
+/* Puts a checked value where it counts; under the lock. */
+static inline int tq_device_apply(tq_device *d, const tqd_register *r, const uint8_t *value)
+{
+    tqd_values *v = &d->values;
+    int state = d->force.state;
+    if ((r->access & TQD_IDLE_ONLY) && (state == TQ_ARMED || state == TQ_RUNNING || state == TQ_RELEASING))
+        return TQD_STATUS_STATE;
+    if (r->address == TQD_COMMAND)
+        return tq_device_command(d, value[0]);
+    if (r->address == TQD_SAMPLES)
+        return tq_device_queue(d, value, r->length);
+    if ((r->address == TQD_SIMULATE || r->address == TQD_STROKE) && !d->board.simulated)
+        return TQD_STATUS_ACCESS;
+    memcpy((uint8_t *)v + r->offset, value, (size_t)r->bytes * r->length);
+    switch (r->address) {
+    case TQD_HEARTBEAT:
+        d->beat = v->tick;
+        break;
+    case TQD_EVENT_RATE:
+        d->record_every = v->event_rate ? TQ_TICK_HZ / (uint32_t)v->event_rate : 0;
+        d->record_number = 0, d->records_out = d->records_in;
+        break;
+    case TQD_SOURCE:
+        if (v->source != TQD_SOURCE_HOST)
+            d->samples_out = d->samples_in;
+        break;
+    case TQD_SIMULATE:
+        d->simulate = v->simulate;
+        break;
+    default:
+        if (r->access & TQD_IDLE_ONLY)
+            tq_device_limit(d);
+        break;
+    }
+    return TQD_STATUS_OK;
+}
+
+/* The value of a register, as it is now; under the lock. */
+static inline void tq_device_look(tq_device *d, const tqd_register *r, uint8_t *value)
+{
+    tqd_values *v = &d->values;
+    if (r->address == TQD_SAMPLES_QUEUED)
+        v->samples_queued = (uint16_t)(d->samples_in - d->samples_out);
+    if (r->address == TQD_FRAMES_BAD)
+        v->frames_bad = d->reader.bad;
+    if (r->address == TQD_TICK_CLOCKS) {
+        v->tick_clocks[0] = d->clocks_ticks ? d->clocks_sum / d->clocks_ticks : 0;
+        v->tick_clocks[1] = d->clocks_most;
+        d->clocks_ticks = d->clocks_sum = d->clocks_most = 0;
+    }
+    memcpy(value, (const uint8_t *)v + r->offset, (size_t)r->bytes * r->length);
+}
+
+static inline void tq_device_read(tq_device *d, const tq_frame *f)
+{
+    uint8_t body[TQ_MOST_BODY];
+    const tqd_register *r = f->length == 1 ? tq_device_register(f->body[0]) : NULL;
+    if (f->length != 1) {
+        tq_device_reply(d, f, TQD_STATUS_LENGTH, NULL, 0);
+    } else if (!r) {
+        tq_device_reply(d, f, TQD_STATUS_ADDRESS, f->body, 1);
+    } else if (!(r->access & TQD_READS)) {
+        tq_device_reply(d, f, TQD_STATUS_ACCESS, f->body, 1);
+    } else {
+        body[0] = r->address;
+        d->board.lock(d->board.context);
+        tq_device_look(d, r, body + 1);
+        d->board.unlock(d->board.context);
+        tq_device_reply(d, f, TQD_STATUS_OK, body, 1 + (size_t)r->bytes * r->length);
+    }
+}
+
+static inline void tq_device_write(tq_device *d, const tq_frame *f)
+{
+    uint8_t body[TQ_MOST_BODY];
+    const tqd_register *r = f->length ? tq_device_register(f->body[0]) : NULL;
+    size_t size = r ? (size_t)r->bytes * r->length : 0;
+    int status;
+    if (!f->length)
+        status = TQD_STATUS_LENGTH;
+    else if (!r)
+        status = TQD_STATUS_ADDRESS;
+    else if (!(r->access & TQD_WRITES))
+        status = TQD_STATUS_ACCESS;
+    else if (f->length != 1 + size)
+        status = TQD_STATUS_LENGTH;
+    else if (!tq_device_ranges(r, f->body + 1) || !tq_device_accepts(d, r->address, f->body + 1))
+        status = TQD_STATUS_RANGE;
+    else {
+        d->board.lock(d->board.context);
+        status = tq_device_apply(d, r, f->body + 1);
+        d->values.state = (uint8_t)d->force.state, d->values.cause = (uint8_t)d->force.cause;
+        d->board.unlock(d->board.context);
+    }
+    memcpy(body, f->body, f->length);
+    if (r && r->address == TQD_COMMAND && status == TQD_STATUS_OK)
+        body[1] = d->values.state;
+    tq_device_reply(d, f, status, body, status == TQD_STATUS_OK ? f->length : f->length ? 1 : 0);
+}
+
+/* --- Frames: uploads --------------------------------------------------------------------------------- */
+
+static inline int tq_device_begin(tq_device *d, const tq_frame *f)
+{
+    uint32_t size;
+    if (f->length != 5)
+        return TQD_STATUS_LENGTH;
+    memcpy(&size, f->body + 1, 4);
+    d->slot = -1;
+    if (size > sizeof d->uploads[0].bytes)
+        return TQD_STATUS_TOO_LARGE;
+    if (d->playing && d->hand.now != d->hand.wanted)
+        return TQD_STATUS_BUSY;
+    d->slot = d->playing ? 1 - d->hand.now : 0;
+    d->upload_bytes = size, d->upload_count = 0;
+    return TQD_STATUS_OK;
+}
+
+static inline int tq_device_data(tq_device *d, const tq_frame *f)
+{
+    uint32_t at, count = f->length - 5u;
+    if (f->length < 6)
+        return TQD_STATUS_LENGTH;
+    memcpy(&at, f->body + 1, 4);
+    if (d->slot < 0)
+        return TQD_STATUS_STATE;
+    if (at != d->upload_count)
+        return TQD_STATUS_SEQUENCE;
+    if (count > d->upload_bytes - d->upload_count)
+        return TQD_STATUS_TOO_LARGE;
+    memcpy(d->uploads[d->slot].bytes + at, f->body + 5, count);
+    d->upload_count += count;
+    return TQD_STATUS_OK;
+}
+
+/* Checks the whole, and has the hand touch it from now on, the one before first fading out. */
+static inline int tq_device_finish(tq_device *d, const tq_frame *f)
+{
+    uint64_t hash;
+    int slot = d->slot;
+    if (f->length != 9)
+        return TQD_STATUS_LENGTH;
+    memcpy(&hash, f->body + 1, 8);
+    if (slot < 0)
+        return TQD_STATUS_STATE;
+    d->slot = -1;
+    if (d->upload_count != d->upload_bytes || hash != tq_hash(d->uploads[slot].bytes, d->upload_count)
+        || !tq_model_of(&d->uploads[slot], d->upload_count, TQ_TICK_HZ, &d->textures[slot]))
+        return TQD_STATUS_MODEL;
+    d->hashes[slot] = hash;
+    d->board.lock(d->board.context);
+    if (d->playing) {
+        tq_scene_switch(&d->hand, slot);
+    } else {
+        d->scene.textures = d->textures, d->scene.count = 2;
+        d->scene.noise = tq_scene_mix(d->values.seed + UINT64_C(0x9E3779B97F4A7C15));
+        tq_scene_start(&d->hand, &d->scene, d->memory, 0, slot);
+        d->playing = 1;
+        d->values.model_tick = d->values.tick, d->values.model_hash = hash;
+    }
+    d->board.unlock(d->board.context);
+    return TQD_STATUS_OK;
+}
+
+static inline void tq_device_upload(tq_device *d, const tq_frame *f)
+{
+    uint8_t body[5];
+    int status;
+    switch (f->length ? f->body[0] : 255) {
+    case 0: status = tq_device_begin(d, f); break;
+    case 1: status = tq_device_data(d, f); break;
+    case 2: status = tq_device_finish(d, f); break;
+    default: status = TQD_STATUS_LENGTH; break;
+    }
+    body[0] = f->length ? f->body[0] : 0;
+    memcpy(body + 1, &d->upload_count, 4);
+    tq_device_reply(d, f, status, body, sizeof body);
+}
+
+/* --- Frames ------------------------------------------------------------------------------------------ */
+
+/* A host says hello: what it has to know, and from which number on it counts. Nothing is armed by it; what
+   was armed is let go. */
+static inline void tq_device_greet(tq_device *d, const tq_frame *f)
+{
+    uint8_t body[21];
+    float rate = TQ_TICK_HZ;
+    const tqd_values *v = &d->values;
+    if (f->length) {
+        tq_device_reply(d, f, TQD_STATUS_LENGTH, NULL, 0);
+        return;
+    }
+    d->board.lock(d->board.context);
+    if (d->force.state == TQ_ARMED || d->force.state == TQ_RUNNING)
+        tq_force_event(&d->force, TQ_FAILED, TQD_CAUSE_HOST);
+    if (!d->greeted) /* the moment of the first hello is not foreseen, either */
+        d->nonce = (uint32_t)tq_scene_mix((uint64_t)d->board.entropy << 32 | v->tick) | 1;
+    d->greeted = 1, d->heard = d->beat = v->tick;
+    d->values.source = TQD_SOURCE_NOTHING, d->samples_out = d->samples_in;
+    d->values.event_rate = 0, d->record_every = 0, d->records_out = d->records_in;
+    d->slot = -1;
+    d->board.unlock(d->board.context);
+    d->expected = (uint16_t)(f->sequence + 1);
+    memcpy(body, &v->who_am_i, 2), memcpy(body + 2, &v->firmware_version, 2);
+    memcpy(body + 4, &v->schema_hash, 8), memcpy(body + 12, &rate, 4);
+    body[16] = v->real_size;
+    memcpy(body + 17, &v->tick, 4);
+    tq_device_reply(d, f, TQD_STATUS_OK, body, sizeof body);
+}
+
+/* A good frame. */
+static inline void tq_device_frame(tq_device *d, const tq_frame *f)
+{
+    uint16_t check = (uint16_t)(tq_crc16(f->body, f->length) ^ f->kind);
+    d->values.frames_good++;
+    if (f->kind == TQ_HELLO) {
+        tq_device_greet(d, f);
+        return;
+    }
+    if (!d->greeted || f->nonce != d->nonce) {
+        tq_device_reply(d, f, TQD_STATUS_NONCE, NULL, 0);
+        return;
+    }
+    if (f->sequence == (uint16_t)(d->expected - 1) && check == d->replied && d->reply_bytes) {
+        d->heard = d->values.tick;
+        tq_device_send(d, d->reply, d->reply_bytes);
+        return;
+    }
+    if (f->sequence != d->expected) {
+        uint8_t kept[TQ_MOST_STUFFED];
+        size_t bytes = d->reply_bytes;
+        memcpy(kept, d->reply, bytes);
+        tq_device_reply(d, f, TQD_STATUS_SEQUENCE, NULL, 0);
+        memcpy(d->reply, kept, bytes), d->reply_bytes = bytes;
+        return;
+    }
+    d->heard = d->values.tick, d->expected++, d->replied = check;
+    switch (f->kind) {
+    case TQ_READ: tq_device_read(d, f); break;
+    case TQ_WRITE: tq_device_write(d, f); break;
+    case TQ_UPLOAD: tq_device_upload(d, f); break;
+    default: tq_device_reply(d, f, TQD_STATUS_KIND, NULL, 0); break;
+    }
+}
+
+/* Bytes from the host. */
+static inline void tq_device_received(tq_device *d, const uint8_t *bytes, size_t count)
+{
+    tq_frame frame;
+    for (; count; count--, bytes++)
+        if (tq_reader_take(&d->reader, *bytes, &frame))
+            tq_device_frame(d, &frame);
+}
+
+/* Sends records that are due, as long as there is room for a reply after them. */
+static inline void tq_device_poll(tq_device *d)
+{
+    uint8_t body[TQ_MOST_BODY], stuffed[TQ_MOST_STUFFED];
+    uint32_t waiting, n;
+    while ((waiting = d->records_in - d->records_out) != 0) {
+        const tq_record *first = &d->records[d->records_out % TQ_RECORDS];
+        uint16_t every = (uint16_t)d->record_every;
+        uint32_t count = 0;
+        if (waiting < TQ_PER_FRAME && d->values.tick - first->tick < TQ_FLUSH_TICKS)
+            return;
+        if (d->board.room(d->board.context) < 2 * TQ_MOST_STUFFED)
+            return;
+        memcpy(body, &first->number, 4), memcpy(body + 4, &first->tick, 4), memcpy(body + 8, &every, 2);
+        for (n = 0; n < waiting && count < TQ_PER_FRAME; n++) {
+            const tq_record *r = &d->records[(d->records_out + n) % TQ_RECORDS];
+            uint8_t *to = body + TQ_EVENT_HEADER + TQ_RECORD_BYTES * count;
+            if (r->number != first->number + n) /* one was lost in between */
+                break;
+            memcpy(to, &r->x_mm, 4), memcpy(to + 4, &r->depth_mm, 4), memcpy(to + 8, &r->speed_mm_s, 4);
+            memcpy(to + 12, &r->force_n, 4), memcpy(to + 16, &r->vibration_g, 4);
+            to[20] = r->flags;
+            count++;
+        }
+        body[10] = (uint8_t)count;
+        n = (uint32_t)tq_stuffed(TQ_EVENT | TQ_REPLY, (uint16_t)first->number, d->nonce, body,
+                                 (uint8_t)(TQ_EVENT_HEADER + TQ_RECORD_BYTES * count), stuffed);
+        d->records_out += count;
+        d->board.send(d->board.context, stuffed, n);
+    }
+}
+
+#endif
