@@ -33,6 +33,19 @@ typedef struct {
     tq_number damping_n_s_per_mm;      /* viscous, of the device itself */
 } tq_cables;
 
+#define TQ_REST_Z_MM (-30)
+
+/* Motors of 27.3 mN m/A and 4.12 A at 300 mm from the middle, encoders of 4096 counts on pulleys of 10 mm;
+   half distance, counts, pulleys, rest and damping are assumed. */
+static inline tq_cables tq_usual_cables(void)
+{
+    tq_cables c;
+    c.half_mm = 300, c.mm_per_count = (tq_number)0.015339808, c.n_per_a = (tq_number)2.73;
+    c.nominal_a = (tq_number)4.12, c.rest_x_mm = 0, c.rest_z_mm = TQ_REST_Z_MM;
+    c.damping_n_s_per_mm = (tq_number)0.0005;
+    return c;
+}
+
 /* Length of one cable for a tool at (x, z). */
 static inline tq_number tq_cable_length(const tq_cables *c, int motor, tq_number x_mm, tq_number z_mm)
 {

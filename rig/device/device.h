@@ -19,6 +19,7 @@
 #define TQ_TICK_HZ 5000
 enum {
     TQ_READ_TICKS = 5,                   /* from one reading of the hand to the next: 1 ms */
+    TQ_REST_TICKS = 10,                  /* of a device that has nothing to do, in one */
     TQ_LINK_TICKS = TQ_TICK_HZ / 10,     /* a host that says nothing for so long is gone */
     TQ_BEAT_TICKS = TQ_TICK_HZ,          /* and so is its control loop */
     TQ_FLUSH_TICKS = TQ_TICK_HZ / 500,   /* a record waits no longer for others of its frame */
@@ -66,7 +67,7 @@ typedef struct {
     uint16_t counts[TQ_MOTORS];
     int32_t counted[TQ_MOTORS], still[TQ_MOTORS]; /* since home; at the last move of each encoder */
     int counting, homed;
-    tq_number length_mm[TQ_MOTORS];
+    tq_number rest_mm[TQ_MOTORS], length_mm[TQ_MOTORS]; /* of the cables, at home and now */
     /* Speed along x: the tracking filter on one position in a millisecond. */
     float track_mm[TQ_TAPS + 1], weights[TQ_TAPS];
     int tracked;
@@ -85,6 +86,9 @@ typedef struct {
     uint64_t switches;
     float samples[TQ_SAMPLES];
     uint32_t samples_in, samples_out;
+    float block_g[TQ_READ_TICKS]; /* of the model, from one reading to the next */
+    int block_at;
+    uint32_t read_tick; /* readings so far */
     tq_number vibration_g;
     /* Records, from the tick to the main loop. */
     tq_record records[TQ_RECORDS];
@@ -158,13 +162,16 @@ static inline void tq_device_start(tq_device *d, const tq_board *board)
     int n;
     memset(d, 0, sizeof *d);
     d->board = *board;
-    d->slot = d->simulate = -1;
+    d->slot = d->simulate = -1, d->block_at = TQ_READ_TICKS;
     tq_device_defaults(d);
     memset(&none, 0, sizeof none);
     tq_force_start(&d->force, &none);
     tq_device_limit(d);
     tq_device_home(d);
     d->homed = 0;
+    for (n = 0; n < TQ_MOTORS; n++)
+        d->rest_mm[n] =
+            tq_cable_length(&board->cables, n, board->cables.rest_x_mm, board->cables.rest_z_mm);
     for (n = 0; n < TQ_TAPS; n++)
         d->weights[n] = (tq_smooth((float)(n + 1) / TQ_TAPS) - tq_smooth((float)n / TQ_TAPS))
                         * (float)(TQ_TICK_HZ / TQ_READ_TICKS);
@@ -192,9 +199,7 @@ static inline void tq_device_count(tq_device *d, const uint16_t counts[TQ_MOTORS
         uint16_t moved = d->counting ? (uint16_t)(counts[n] - d->counts[n]) : 0;
         d->counted[n] += moved < 0x8000 ? (int32_t)moved : (int32_t)moved - 0x10000; /* modulo 2^16 */
         d->counts[n] = counts[n];
-        d->length_mm[n] = tq_cable_length(&d->board.cables, n, d->board.cables.rest_x_mm,
-                                          d->board.cables.rest_z_mm)
-                          + (tq_number)d->counted[n] * d->board.cables.mm_per_count;
+        d->length_mm[n] = d->rest_mm[n] + (tq_number)d->counted[n] * d->board.cables.mm_per_count;
     }
     d->counting = 1;
 }
@@ -224,19 +229,18 @@ static inline void tq_device_sense(tq_device *d, int button, tq_sensed *sensed)
     sensed->button = button;
 }
 
-/* Lets go where the host is gone, or its control loop, or an encoder. */
+/* Lets go where the host is gone, or its control loop. */
 static inline void tq_device_mind(tq_device *d)
 {
     uint32_t now = d->values.tick;
-    int stuck = tq_device_stuck(d);
     if (d->force.state != TQ_ARMED && d->force.state != TQ_RUNNING)
         return;
     if (now - d->heard > TQ_LINK_TICKS)
         tq_force_event(&d->force, TQ_FAILED, TQD_CAUSE_LINK);
     else if (now - d->beat > TQ_BEAT_TICKS)
         tq_force_event(&d->force, TQ_FAILED, TQD_CAUSE_HEARTBEAT);
-    else if (stuck)
-        tq_force_event(&d->force, TQ_FAILED, TQD_CAUSE_STUCK);
+    else if (d->failing)
+        tq_force_event(&d->force, TQ_FAILED, TQD_CAUSE_NOT_WRITTEN);
 }
 
 /* Currents for the force that was decided; none in a state without force. */
@@ -326,20 +330,25 @@ static inline float tq_device_speed(tq_device *d)
     return speed + (d->track_mm[TQ_TAPS] - d->track_mm[TQ_TAPS - 1]) * d->weights[TQ_TAPS - 1];
 }
 
-static inline float tq_device_model_sample(tq_device *d, int reads)
+/* The model's samples from this reading to the next: as many bits as one by one, at half the cost. */
+static inline void tq_device_model_block(tq_device *d)
 {
-    tq_real sample = 0;
+    tq_real block[TQ_READ_TICKS];
+    int n;
     if (!d->playing)
-        return 0;
-    if (reads)
-        tq_scene_read(&d->hand, 0, d->values.speed, d->values.force);
-    tq_scene_render_on(&d->hand, &sample, 1);
-    if (d->hand.switches != d->switches) { /* the next model begins with this sample */
+        return;
+    tq_scene_read(&d->hand, 0, d->values.speed, d->values.force);
+    tq_scene_render_on(&d->hand, block, TQ_READ_TICKS);
+    for (n = 0; n < TQ_READ_TICKS; n++)
+        d->block_g[n] = (float)block[n];
+    d->block_at = 0;
+    if (d->hand.switches != d->switches) { /* in this block */
         d->switches = d->hand.switches;
-        d->values.model_tick = d->values.tick;
+        d->values.model_tick = d->values.tick + TQ_READ_TICKS - (uint32_t)d->hand.state.position;
         d->values.model_hash = d->hashes[d->hand.now];
+    } else if (d->hand.state.position == TQ_READ_TICKS) {
+        d->values.model_tick = d->values.tick;
     }
-    return (float)sample;
 }
 
 static inline float tq_device_host_sample(tq_device *d)
@@ -352,24 +361,20 @@ static inline float tq_device_host_sample(tq_device *d)
     return 0.9f * d->values.vibration; /* a step to 0 would be felt */
 }
 
-static inline int tq_device_plays(const tq_device *d, int source)
-{
-    return d->values.source == source;
-}
-
-/* The next sample. The model goes on in silence while something else is played. */
+/* The next sample. A model that is not played stands still. */
 static inline void tq_device_vibrate(tq_device *d, int reads)
 {
-    float model, sample = 0, most = d->values.vibration_limit;
+    float sample = 0, most = d->values.vibration_limit;
     if (reads) {
         float newton = d->force.normal_n > 0 ? (float)d->force.normal_n : 0;
         d->values.speed = tq_device_speed(d);
         d->values.force = newton >= d->values.contact_force ? newton : 0;
     }
-    model = tq_device_model_sample(d, reads);
-    if (tq_device_plays(d, TQD_SOURCE_MODEL))
-        sample = model;
-    else if (tq_device_plays(d, TQD_SOURCE_HOST))
+    if (d->values.source == TQD_SOURCE_MODEL && reads)
+        tq_device_model_block(d);
+    if (d->values.source == TQD_SOURCE_MODEL && d->block_at < TQ_READ_TICKS)
+        sample = d->block_g[d->block_at++];
+    else if (d->values.source == TQD_SOURCE_HOST)
         sample = tq_device_host_sample(d);
     if (!(sample - sample == 0)) /* not a number: never with a model that was checked */
         sample = 0;
@@ -403,8 +408,16 @@ static inline void tq_device_record(tq_device *d, int button)
     d->records_in++; /* after the record is whole: the main loop reads it then */
 }
 
-/* One tick: the encoders' counters, modulo 2^16, and the button. */
-static inline void tq_device_tick(tq_device *d, const uint16_t counts[TQ_MOTORS], int button)
+/* How many ticks the next one may stand for: several while there is neither force nor vibration nor anybody
+   who wants records. */
+static inline int tq_device_pace(const tq_device *d)
+{
+    int state = d->force.state, idle = state == TQ_BOOT || state == TQ_IDLE || state == TQ_FAULT;
+    return idle && !d->record_every && d->values.source == TQD_SOURCE_NOTHING ? TQ_REST_TICKS : 1;
+}
+
+/* One tick, or `ticks` in one: the encoders' counters, modulo 2^16, and the button. */
+static inline void tq_device_tick(tq_device *d, const uint16_t counts[TQ_MOTORS], int button, int ticks)
 {
     tq_sensed sensed;
     tqd_values *v = &d->values;
@@ -412,18 +425,19 @@ static inline void tq_device_tick(tq_device *d, const uint16_t counts[TQ_MOTORS]
     tq_device_count(d, counts);
     tq_device_sense(d, button, &sensed);
     tq_device_mind(d);
-    if (d->failing && (d->force.state == TQ_ARMED || d->force.state == TQ_RUNNING))
-        tq_force_event(&d->force, TQ_FAILED, TQD_CAUSE_NOT_WRITTEN);
-    tq_force_tick(&d->force, &sensed, (tq_number)1 / TQ_TICK_HZ);
+    tq_force_tick(&d->force, &sensed, (tq_number)ticks / TQ_TICK_HZ);
+    if (tq_device_stuck(d) && (d->force.state == TQ_ARMED || d->force.state == TQ_RUNNING))
+        tq_force_event(&d->force, TQ_FAILED, TQD_CAUSE_STUCK); /* unless it jumped */
     tq_device_pull(d);
     v->position[0] = (float)sensed.position_mm[0], v->position[1] = (float)sensed.position_mm[2];
     v->depth = (float)d->force.depth_mm, v->button = (uint8_t)button;
-    tq_device_vibrate(d, v->tick % TQ_READ_TICKS == 0);
+    tq_device_vibrate(d, v->tick / TQ_READ_TICKS != d->read_tick);
+    d->read_tick = v->tick / TQ_READ_TICKS;
     v->state = (uint8_t)d->force.state, v->cause = (uint8_t)d->force.cause;
     tq_device_act(d);
     tq_device_note(d, before);
     tq_device_record(d, button);
-    v->tick++;
+    v->tick += (uint32_t)ticks;
 }
 
 /* How many of the board's clocks the last tick took. */
@@ -602,6 +616,7 @@ static inline int tq_device_apply(tq_device *d, const tqd_register *r, const uin
         d->record_number = 0, d->records_out = d->records_in;
         break;
     case TQD_SOURCE:
+        d->block_at = TQ_READ_TICKS;
         if (v->source != TQD_SOURCE_HOST)
             d->samples_out = d->samples_in;
         break;
@@ -736,8 +751,7 @@ static inline int tq_device_finish(tq_device *d, const tq_frame *f)
         d->scene.textures = d->textures, d->scene.count = 2;
         d->scene.noise = tq_scene_mix(d->values.seed + UINT64_C(0x9E3779B97F4A7C15));
         tq_scene_start(&d->hand, &d->scene, d->memory, 0, slot);
-        d->playing = 1;
-        d->values.model_tick = d->values.tick, d->values.model_hash = hash;
+        d->playing = 1, d->values.model_hash = hash;
     }
     d->board.unlock(d->board.context);
     return TQD_STATUS_OK;

@@ -12,9 +12,6 @@
 #define TQ_HAND_KG ((tq_number)0.15)
 #define TQ_HAND_N_PER_MM ((tq_number)0.3)
 #define TQ_HAND_N_S_PER_MM ((tq_number)0.0094)
-#define TQ_MM_PER_COUNT ((tq_number)0.015339808) /* 4096 counts on a pulley of 10 mm */
-#define TQ_REST_Z_MM (-30)
-
 typedef struct {
     tq_number x_mm, z_mm, vx_mm_s, vz_mm_s, share;
     tq_number cosine, sine; /* of the stroke's phase */
@@ -22,15 +19,6 @@ typedef struct {
     uint16_t counts[TQ_MOTORS], offset[TQ_MOTORS];
     int stuck, flipped, unplugged, motor_fails;
 } tq_simulated;
-
-static inline tq_cables tq_simulated_cables(void)
-{
-    tq_cables c;
-    c.half_mm = 300, c.mm_per_count = TQ_MM_PER_COUNT, c.n_per_a = (tq_number)2.73;
-    c.nominal_a = (tq_number)4.12, c.rest_x_mm = 0, c.rest_z_mm = TQ_REST_Z_MM;
-    c.damping_n_s_per_mm = (tq_number)0.0005;
-    return c;
-}
 
 static inline void tq_simulated_start(tq_simulated *s, uint16_t offset)
 {
@@ -51,7 +39,7 @@ static inline int tq_simulated_write(tq_simulated *s, int output, tq_number valu
     return 0;
 }
 
-/* A period of the tick of the hand's movement. */
+/* The hand's movement in one tick. */
 static inline void tq_simulated_move(tq_simulated *s, const tqd_values *v, const tq_cables *c)
 {
     const tq_number step_s = (tq_number)1 / TQ_TICK_HZ;
@@ -109,8 +97,8 @@ static inline void tq_simulated_spoil(tq_simulated *s, int what)
         s->flipped = 1;
 }
 
-/* One tick of a simulated board. */
-static inline void tq_simulated_tick(tq_simulated *s, tq_device *d)
+/* Before a tick of a simulated board: what was asked to go wrong, and where the hand is by now. */
+static inline void tq_simulated_before(tq_simulated *s, tq_device *d, int ticks)
 {
     int what = d->simulate;
     d->simulate = -1;
@@ -119,13 +107,12 @@ static inline void tq_simulated_tick(tq_simulated *s, tq_device *d)
         board.entropy = board.entropy * 2654435761u + d->values.tick + 1;
         tq_simulated_start(s, what == TQD_SIMULATION_WRAPPED ? 65436 : 0);
         tq_device_start(d, &board);
-        d->simulate = -1;
     } else if (what >= 0) {
         tq_simulated_spoil(s, what);
     }
-    tq_simulated_move(s, &d->values, &d->board.cables);
+    for (; ticks; ticks--)
+        tq_simulated_move(s, &d->values, &d->board.cables);
     tq_simulated_count(s, &d->board.cables);
-    tq_device_tick(d, s->counts, 0);
 }
 
 #endif

@@ -61,7 +61,7 @@ static inline void tq_virtual_start(tq_virtual *v, uint32_t entropy, uint32_t ba
     memset(&board, 0, sizeof board);
     board.context = v, board.write = tq_virtual_write, board.room = tq_virtual_room;
     board.send = tq_virtual_send, board.lock = board.unlock = tq_virtual_nothing;
-    board.cables = tq_simulated_cables();
+    board.cables = tq_usual_cables();
     board.entropy = entropy, board.baud = baud, board.simulated = 1;
     tq_simulated_start(&v->simulated, 0);
     tq_device_start(&v->device, &board);
@@ -77,7 +77,8 @@ static inline void tq_virtual_receive(tq_virtual *v, const uint8_t *bytes, size_
 static inline void tq_virtual_step(tq_virtual *v, size_t ticks)
 {
     for (; ticks; ticks--) {
-        tq_simulated_tick(&v->simulated, &v->device);
+        tq_simulated_before(&v->simulated, &v->device, 1);
+        tq_device_tick(&v->device, v->simulated.counts, 0, 1);
         tq_device_poll(&v->device);
     }
 }
@@ -93,10 +94,16 @@ static inline size_t tq_virtual_take(tq_virtual *v, uint8_t *out, size_t most)
     return n;
 }
 
-#ifdef _WIN32
-static int tq_virtual_run(tq_virtual *v, int port, int end)
+/* Every output off. */
+static inline void tq_virtual_shut(tq_virtual *v)
 {
-    (void)v, (void)port, (void)end;
+    tq_device_shut(&v->device);
+}
+
+#ifdef _WIN32
+static int tq_virtual_run(tq_virtual *v, int port, int end, int other)
+{
+    (void)v, (void)port, (void)end, (void)other;
     return -1;
 }
 #else
@@ -107,12 +114,12 @@ static inline double tq_virtual_now(void)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-static inline int tq_virtual_wait(struct pollfd on[2], const struct timespec *wait)
+static inline int tq_virtual_wait(struct pollfd on[3], const struct timespec *wait)
 {
 #ifdef __linux__
-    return ppoll(on, 2, wait, NULL);
+    return ppoll(on, 3, wait, NULL);
 #else
-    return poll(on, 2, wait->tv_nsec > 0);
+    return poll(on, 3, wait->tv_nsec > 0);
 #endif
 }
 
@@ -129,16 +136,20 @@ static inline int tq_virtual_flush(tq_virtual *v, int port)
     return 0;
 }
 
-/* Until descriptor `end` can be read or is closed: 5000 ticks a second, and bytes from `port`, which does
-   not block. A board's clock never stops; where this process was held up for over 20 ms, its does. */
-static int tq_virtual_run(tq_virtual *v, int port, int end)
+/* 5000 ticks a second, and bytes from `port`, which does not block (-1 for none), until `end` or `other` can
+   be read or is closed: 0 or 1; -1 where the port is gone. A board's clock never stops; where this process
+   was held up for over 20 ms, its does. */
+static int tq_virtual_run(tq_virtual *v, int port, int end, int other)
 {
     double due_s = tq_virtual_now(), now_s;
-    struct pollfd on[2];
+    struct pollfd on[3];
     uint8_t bytes[512];
+    memset(on, 0, sizeof on);
+    on[0].fd = port, on[1].fd = end, on[2].fd = other;
+    on[1].events = on[2].events = POLLIN;
     for (;;) {
         struct timespec wait = { 0, 0 };
-        ssize_t count;
+        ssize_t count = 0;
         now_s = tq_virtual_now();
         if (now_s - due_s > 0.02) {
             v->device.values.ticks_late += (uint32_t)((now_s - due_s) * TQ_TICK_HZ);
@@ -146,21 +157,19 @@ static int tq_virtual_run(tq_virtual *v, int port, int end)
         }
         for (; due_s <= now_s; due_s += 1.0 / TQ_TICK_HZ)
             tq_virtual_step(v, 1);
-        if (tq_virtual_flush(v, port))
+        if (port >= 0 && tq_virtual_flush(v, port))
             return -1;
-        wait.tv_nsec = (long)(1e9 * (due_s - now_s));
-        on[0].fd = port, on[0].events = (short)(POLLIN | (v->waiting ? POLLOUT : 0)), on[0].revents = 0;
-        on[1].fd = end, on[1].events = POLLIN, on[1].revents = 0;
+        /* Longer where nothing is to be done: the ticks are made up for at once. */
+        wait.tv_nsec = (long)(1e9 * (due_s - now_s + (tq_device_pace(&v->device) - 1.0) / TQ_TICK_HZ));
         wait.tv_nsec = wait.tv_nsec < 0 ? 0 : wait.tv_nsec;
+        on[0].events = (short)(POLLIN | (v->waiting ? POLLOUT : 0));
         if (tq_virtual_wait(on, &wait) < 0 && errno != EINTR)
             return -1;
-        if (on[1].revents) {
-            tq_device_shut(&v->device);
-            return 0;
-        }
-        while ((count = read(port, bytes, sizeof bytes)) > 0)
+        if (on[1].revents || on[2].revents)
+            return on[1].revents ? 0 : 1;
+        while (port >= 0 && (count = read(port, bytes, sizeof bytes)) > 0)
             tq_virtual_receive(v, bytes, (size_t)count);
-        if (tq_virtual_flush(v, port))
+        if (port >= 0 && ((count == 0 && on[0].revents & POLLIN) || tq_virtual_flush(v, port)))
             return -1;
     }
 }

@@ -127,7 +127,8 @@ static inline size_t tq_stuffed(uint8_t kind, uint16_t sequence, uint32_t nonce,
     size_t count = TQ_HEADER + (size_t)length, n, code = 1, to = 2;
     plain[0] = kind, plain[1] = (uint8_t)sequence, plain[2] = (uint8_t)(sequence >> 8), plain[7] = length;
     memcpy(plain + 3, &nonce, 4);
-    memcpy(plain + TQ_HEADER, body, length);
+    if (length)
+        memcpy(plain + TQ_HEADER, body, length);
     if (tq_has_crc32(kind)) {
         uint32_t crc = tq_crc32(plain, count);
         memcpy(plain + count, &crc, 4);

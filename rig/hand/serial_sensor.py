@@ -6,16 +6,16 @@ import os
 import select
 import time
 
-from modeling.errors import InputError, shown
+from modeling.errors import InputError
 from modeling.extras import extra
 from rig.hand.sample import LOST_S, ConnectedDevice, DeviceLost, Sample
 from rig.hand.serial_line import LineReader, SensorClock, SensorLine
 from rig.hand.settings import HandSettings
 from rig.live.memory import now_s
+from rig.wire.ports import opened_port, port_names, ports_listed
 
 with extra("rig"):
     import serial
-    from serial.tools import list_ports
 
 FIRST_LINE_S = 3.0  # many boards restart when their port is opened
 _POLL_S = 0.001
@@ -50,7 +50,7 @@ class SerialSensor:
         InputError
             Without the port, permission, or a line; or where another program reads it.
         """
-        sensor = cls(_opened(settings.device or _only_port(), settings.baud))
+        sensor = cls(opened_port(settings.device or _only_port(), settings.baud))
         try:
             sensor._wait_for_first(settings.baud)
         except BaseException:
@@ -158,12 +158,9 @@ class SerialSensor:
 
 def serial_ports() -> tuple[ConnectedDevice, ...]:
     """All serial ports, whatever is connected to them."""
-    ports = sorted(list_ports.comports(), key=lambda port: str(port.device))
     return tuple(
-        ConnectedDevice(
-            port.device, port.description or "unknown", "serial", os.access(port.device, os.R_OK)
-        )
-        for port in ports
+        ConnectedDevice(path, name, "serial", os.access(path, os.R_OK))
+        for path, name in port_names()
     )
 
 
@@ -177,47 +174,10 @@ def _sample(line: SensorLine, time_s: float) -> Sample:
 
 
 def _only_port() -> str:
-    ports = serial_ports()
+    ports = port_names()
     if len(ports) != 1:
         raise InputError(
-            f"expected one serial port, or device under [hand], got {_listed(ports)}; plug the "
+            f"expected one serial port, or device under [hand], got {ports_listed()}; plug the "
             "sensor in or name its port."
         )
-    return ports[0].path
-
-
-def _opened(path: str, baud: int) -> serial.Serial:
-    try:
-        port = serial.Serial(path, baud, timeout=0, write_timeout=1, exclusive=True)
-        port.reset_input_buffer()  # what waited there has no moment of arrival
-    except Exception as error:  # pyserial lets those of the system's layers through (termios.error)
-        raise _not_opened(path, baud, error) from None
-    return port
-
-
-def _not_opened(path: str, baud: int, error: Exception) -> InputError:
-    text = str(error)
-    if not os.path.exists(path):
-        return InputError(
-            f"expected a serial port at {shown(path)}, got nothing there; there are "
-            f"{_listed(serial_ports())}."
-        )
-    if "lock port" in text:
-        return InputError(
-            f"expected the serial port {path} for this program alone, got one that another program "
-            "reads; end that program."
-        )
-    if isinstance(error, OSError) and error.errno == 13:
-        return InputError(
-            f"expected permission to read {path}, got none; run `sudo usermod -aG dialout $USER` "
-            "and log in again."
-        )
-    if isinstance(error, ValueError | OverflowError) or "baud" in text:
-        return InputError(
-            f"expected a baud rate that {path} can do, got {baud}; take 115200 or 500000."
-        )
-    return InputError(f"expected a serial port at {path}, got a refusal ({text}); check the path.")
-
-
-def _listed(ports: tuple[ConnectedDevice, ...]) -> str:
-    return ", ".join(f"{port.path} ({port.name})" for port in ports) or "none"
+    return ports[0][0]

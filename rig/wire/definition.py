@@ -244,7 +244,7 @@ class Definition:
             for r in sorted(self.registers.values(), key=lambda r: r.address)
         ]
         masks = [
-            (mask.name, mask.bits, [(name, value) for name, (value, _) in mask.members.items()])
+            (mask.name, mask.bits, sorted((value, name) for name, (value, _) in mask.members.items()))
             for mask in sorted(self.masks.values(), key=lambda mask: mask.name)
         ]
         text = repr((SCHEMA, self.name, self.who_am_i, self.firmware_version, agreed, masks))

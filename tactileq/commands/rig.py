@@ -6,6 +6,7 @@ import typer
 
 from tactileq.commands.rig_calibrate import rig_calibrate
 from tactileq.commands.rig_check import rig_check
+from tactileq.commands.rig_device import rig_device
 from tactileq.commands.rig_latency import rig_latency
 from tactileq.commands.rig_monitor import rig_monitor
 from tactileq.commands.rig_play import rig_play
@@ -28,3 +29,4 @@ rig.command("pose")(rig_pose)
 rig.command("stiffness")(rig_stiffness)
 rig.command("play")(rig_play)
 rig.command("twin")(rig_twin)
+rig.command("device")(rig_device)

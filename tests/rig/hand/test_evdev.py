@@ -157,7 +157,7 @@ def test_serial_ports_are_told_beside_input_devices(
     ports = [
         SimpleNamespace(device=f"/dev/ttyACM{n}", description=d) for n, d in ((1, None), (0, "X"))
     ]
-    monkeypatch.setattr("rig.hand.serial_sensor.list_ports.comports", lambda: ports)
+    monkeypatch.setattr("rig.wire.ports.list_ports.comports", lambda: ports)
     assert list(map(str, connected_devices())) == [
         f"A Mouse ({desk.dev / 'event4'}, mouse)",
         "X (/dev/ttyACM0, serial)",

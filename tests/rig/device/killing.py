@@ -1,0 +1,66 @@
+"""A host that is killed while the wall pushes, and how long the device pulled on by its own clock."""
+
+from __future__ import annotations
+
+import random
+import signal
+import subprocess
+import sys
+import time
+
+from rig.device.definition import DEVICE
+from rig.wire.conversation import Conversation
+from rig.wire.transports import opened_transport
+
+BAUD = 1_000_000
+HOST = """
+import sys, time
+from rig.device.definition import DEVICE
+from rig.wire.link import Link
+from rig.wire.transports import opened_transport
+with Link(lambda: opened_transport(sys.argv[1], 1_000_000), DEVICE) as link:
+    if link.read("State") == 5:
+        link.write("Command", 4)
+        time.sleep(0.05)
+    for command in (6, 1, 2):
+        link.write("Command", command)
+    while link.read("Force") < 0.2:
+        link.beat()
+    print("pushes", flush=True)
+    while True:
+        link.beat()
+        time.sleep(0.02)
+"""
+
+
+def ticks_after_kill(address: str, seed: int, how: int = signal.SIGKILL) -> int:
+    """From the host's last frame to no current, in ticks of the device.
+
+    Parameters
+    ----------
+    how : int
+        SIGKILL or SIGSTOP.
+    """
+    with subprocess.Popen(
+        [sys.executable, "-c", HOST, address], stdout=subprocess.PIPE, text=True
+    ) as host:
+        try:
+            assert host.stdout is not None
+            assert host.stdout.readline() == "pushes\n"
+            time.sleep(random.Random(seed).uniform(0.0, 0.1))
+            host.send_signal(how)
+            time.sleep(0.25)
+        finally:
+            host.kill()
+    transport = opened_transport(address, BAUD)
+    try:
+        talk = Conversation(transport, DEVICE)
+        talk.hello()
+        assert talk.read("Current") == (0.0, 0.0)
+        assert (talk.read("State"), talk.read("Cause")) == (5, 14)
+        zero, heard = talk.read("ZeroTick"), talk.read("HeardTick")
+        assert isinstance(zero, int)
+        assert isinstance(heard, int)
+        return zero - heard
+    finally:
+        transport.close()

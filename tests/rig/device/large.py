@@ -1,0 +1,31 @@
+"""The large numbers of tests/rig/device: `python -m tests.rig.device.large` (about five minutes)."""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+from pathlib import Path
+
+from rig.device.emulating import Emulator
+from tests.rig.device.compiled import compiled_walks
+from tests.rig.device.killing import ticks_after_kill
+
+KILLS = 100
+
+
+def main() -> None:
+    """Print what each of them found."""
+    with tempfile.TemporaryDirectory() as folder:
+        checked = compiled_walks(Path(folder), checked=True)
+        subprocess.run([checked, "damaged", "17", "11000000"], check=True)
+        fast = compiled_walks(Path(folder))
+        subprocess.run([fast, "paths", "6"], check=True)
+        subprocess.run([fast, "limits", "23", "100000000"], check=True)
+        subprocess.run([fast, "silences", "10000"], check=True)
+    with Emulator("process") as device:
+        ticks = [ticks_after_kill(device.address, seed) for seed in range(KILLS)]
+    print(f"kills {KILLS} shortest {min(ticks)} longest {max(ticks)}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,78 @@
+"""A conversation with a simulated board in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rig.device.definition import DEVICE
+from rig.device.registers import Cause, Command, Simulation, Source, State
+from rig.device.virtual import TICK_HZ, Board, VirtualTransport
+from rig.wire.conversation import RECORD, Block, Conversation
+
+
+class Talk(Conversation):
+    """With the board's transport, and words for what tests do."""
+
+    def __init__(self, board: Board | None = None) -> None:
+        self.wire = VirtualTransport(board)
+        super().__init__(self.wire, DEVICE)
+        self.hello()
+
+    def ask(self, command: Command) -> State:
+        """The state after a command."""
+        return State(int(self.write("Command", command)))  # type: ignore[arg-type]
+
+    def number(self, name: str) -> Any:
+        """A register of one number."""
+        return self.read(name)
+
+    @property
+    def state(self) -> State:
+        """As it is now."""
+        return State(self.number("State"))
+
+    @property
+    def cause(self) -> Cause:
+        """Of the last fault."""
+        return Cause(self.number("Cause"))
+
+    def run(self, seconds: float) -> None:
+        """Look after the device for so long."""
+        end_s = self.now_s() + seconds
+        while self.now_s() < end_s:
+            self.write("Heartbeat", 1)
+            self.wire.step(round(0.02 * TICK_HZ))
+
+    def push(self) -> None:
+        """Show the wall, and stroke until it pushes."""
+        assert self.ask(Command.HOME) == State.IDLE
+        assert self.ask(Command.ARM) == State.ARMED
+        assert self.ask(Command.SHOW) == State.RUNNING
+        self.run(1.5)
+        assert self.number("Force") > 0.2
+
+    def spoil(self, what: Simulation) -> None:
+        """Something goes wrong with the board."""
+        self.write("Simulate", what)
+
+    def recorded(self, seconds: float, *, source: Source = Source.NOTHING) -> list[Block]:
+        """Records of so long, at every tick."""
+        self.write("Source", source)
+        self.write("EventRate", TICK_HZ)
+        blocks, end_s, step_s = [], self.now_s() + seconds, 0.004
+        while self.now_s() < end_s:
+            self.write("Heartbeat", 1)
+            self.listen(step_s)
+            blocks += self.blocks()
+        return blocks
+
+
+def joined(blocks: Sequence[Block]) -> np.ndarray[Any, np.dtype[Any]]:
+    """The records of all blocks, which are to have no gap."""
+    numbers = [block.number for block in blocks]
+    sizes = [block.values.size for block in blocks]
+    assert numbers == list(np.cumsum([numbers[0], *sizes])[:-1])
+    return np.concatenate([block.values for block in blocks]).astype(RECORD)
