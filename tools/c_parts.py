@@ -4,8 +4,8 @@
 `_many` renders many streams side by side, `modeling.estimation._slopes` is what the fit of layers
 spends its time on, `benches.rendering._rivals` is what the bench compares,
 `rig.live._live` is the memory that processes of a rig share, the callback that plays and the servo
-of a force device, `rig.force._standin` a stand-in for the library of its maker, `rig.device._device`
-the firmware on a simulated board.
+of a force device, `rig.force._standin` a stand-in for the library of its maker,
+`rig.device._device` the firmware on a simulated board.
 """
 
 from __future__ import annotations

@@ -138,6 +138,8 @@ class Emulator:
     ----------
     address : str
         Path of the pseudo-terminal, or socket://HOST:PORT.
+    firmware : Path, optional
+        What QEMU runs.
     """
 
     def __init__(self, kind: Kind, *, baud: int | None = None, port: int = 0) -> None:
@@ -147,6 +149,7 @@ class Emulator:
         self._stack = ExitStack()
         self._child: subprocess.Popen[str] | None = None
         self.address = ""
+        self.firmware: Path | None = None
 
     def open(self) -> None:
         """Start it; returns once it can be reached.
@@ -162,7 +165,8 @@ class Emulator:
         if self._kind == "process":
             compiled_device()
         else:
-            what = f"{BOARDS[self._kind].machine}:{self._firmware()}"
+            self.firmware = self._built()
+            what = f"{BOARDS[self._kind].machine}:{self.firmware}"
         command = [sys.executable, "-m", "rig.device.process", what]
         self._child = subprocess.Popen(
             [*command, str(self._baud), str(self._port)],
@@ -180,7 +184,7 @@ class Emulator:
                 f"expected the emulated device to start, got: {said}; take another port, or none."
             )
 
-    def _firmware(self) -> Path:
+    def _built(self) -> Path:
         if shutil.which("qemu-system-arm") is None:
             raise InputError(
                 f"expected qemu-system-arm to emulate {self._kind}, got none; install it (Debian: "

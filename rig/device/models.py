@@ -1,4 +1,4 @@
-"""A model as the device takes it: the members of the kernel's texture as bytes (docs/device.md#models)."""
+"""A model as the device takes it: the kernel's texture as bytes (docs/device.md#models)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""An emulated device's process: `python -m rig.device.process KIND BAUD PORT`, until its input ends.
+"""An emulated device: `python -m rig.device.process KIND BAUD PORT`, until its input ends.
 
-It prints where the device is reached: the path of a pseudo-terminal, or socket://HOST:PORT where PORT
-is not 0. KIND is "process", or the machine of QEMU and the firmware's file with a colon between.
+It prints where the device is reached: the path of a pseudo-terminal, or socket://HOST:PORT where
+PORT is not 0. KIND is "process", or QEMU's machine and the firmware's file with a colon between.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ def main() -> None:
     if kind == "process":
         _run(Board(entropy=int.from_bytes(os.urandom(4)), baud=baud), port)
     else:
-        _run_qemu(*kind.split(":", 1), port)
+        machine, firmware = kind.split(":", 1)
+        _run_qemu(machine, firmware, port)
 
 
 def _run(board: Board, port: int) -> None:
@@ -75,8 +76,10 @@ def _run_qemu(machine: str, firmware: str, port: int) -> None:
                 _say(f"{SOCKET}{HOST}:{port}")
             else:  # char device redirected to PATH (label …)
                 line = qemu.stdout.readline().decode(errors="replace")
-                _say(line.split("redirected to ")[1].split()[0] if "redirected to" in line else line)
-            select.select([_INPUT, qemu.stdout], [], [])
+                _say(
+                    line.split("redirected to ")[1].split()[0] if "redirected to" in line else line
+                )
+            select.select([_INPUT, qemu.stdout.fileno()], [], [])
         finally:
             qemu.kill()
 
@@ -90,7 +93,8 @@ def _wait_for(port: int, qemu: subprocess.Popen[bytes]) -> None:
 
 
 def _say(where: str) -> None:
-    print(where, flush=True)
+    sys.stdout.write(f"{where}\n")
+    sys.stdout.flush()
 
 
 if __name__ == "__main__":

@@ -221,8 +221,8 @@ typedef struct {
     float low, high;
 } tqd_range;
 
-/* One register: bytes of an element, elements, its first range and whether each element has its own,
-   where its value begins. */
+/* One register: bytes of an element, elements, its first range, whether each element has
+   its own, and where its value begins. */
 typedef struct {
     uint8_t address, kind, bytes, length, access, ranges, each;
     uint16_t offset;

@@ -1,4 +1,7 @@
-"""What registers of tactileq-cables hold. Made from device.yml by `make docs-tables`; do not edit."""
+"""What registers of tactileq-cables hold.
+
+Made from device.yml by `make docs-tables`; do not edit.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ from enum import IntEnum, IntFlag
 
 
 class State(IntEnum):
-    """States of rig/force/force.h; there is force in ARMED (a wall ramps out), RUNNING and RELEASING only."""
+    """States of rig/force/force.h."""
 
     BOOT = 0
     IDLE = 1
@@ -17,7 +20,7 @@ class State(IntEnum):
 
 
 class Command(IntEnum):
-    """What the host asks for; each is refused in a state where it means nothing."""
+    """What the host asks for."""
 
     NONE = 0
     ARM = 1
@@ -29,7 +32,7 @@ class Command(IntEnum):
 
 
 class Cause(IntEnum):
-    """Why the device let go; the first one is kept until CLEAR."""
+    """Why the device let go."""
 
     NONE = 0
     NOT_READ = 1

@@ -1,7 +1,7 @@
 """One host talking to one device: hello, reading and writing registers, uploads, records.
 
-It waits for each reply before it sends more, repeats a frame that was not answered (which the device
-then does once), and knows no thread; `rig.wire.link` has one.
+It waits for each reply before it sends more, repeats a frame that was not answered (which the
+device then does once), and knows no thread; `rig.wire.link` has one.
 """
 
 from __future__ import annotations
@@ -41,6 +41,9 @@ RECORD = np.dtype(
         ("flags", "u1"),
     ]
 )
+
+
+_MEASURED = ("x_mm", "depth_mm", "speed_mm_s", "force_n", "vibration_g")
 
 
 class DeviceRefused(InputError):
@@ -217,7 +220,7 @@ class Conversation:
                 f"the device at {self._transport.name} did not answer for {within_s:g} s."
             )
         status = reply.body[0]
-        anew = status == _STATUS_SEQUENCE and kind != Kind.UPLOAD  # there: another place in the model
+        anew = status == _STATUS_SEQUENCE and kind != Kind.UPLOAD  # there: another place
         if status == _STATUS_NONCE or anew:
             raise TransportLost(f"the device at {self._transport.name} has started anew.")
         if status != _STATUS_OK:
@@ -290,7 +293,7 @@ class Conversation:
         if len(self._blocks) >= _MOST_BLOCKS:
             self.counts["dropped"] += self._blocks.popleft().values.size
         block = Block(number, tick, every, np.frombuffer(values, dtype=RECORD))
-        if np.isfinite([block.values[name] for name in RECORD.names[:5]]).all():
+        if np.isfinite([block.values[name] for name in _MEASURED]).all():
             self._blocks.append(block)
 
     def _register(self, name: str) -> Register:
@@ -318,8 +321,8 @@ class Conversation:
         if hello.schema_hash != wanted.schema_hash:
             raise InputError(
                 f"expected the registers of schema {wanted.schema_hash:016x} from the device at "
-                f"{self._transport.name}, got {hello.schema_hash:016x}; load the firmware that came "
-                "with this tactileq."
+                f"{self._transport.name}, got {hello.schema_hash:016x}; load the firmware that "
+                "came with this tactileq."
             )
 
     def _unanswered(self, within_s: float, something: bool) -> InputError:
@@ -332,6 +335,6 @@ class Conversation:
 
     def _other(self, got: str) -> str:
         return (
-            f"expected {self._definition.name} at {self._transport.name}, got {got}; check the port "
-            "and its baud rate."
+            f"expected {self._definition.name} at {self._transport.name}, got {got}; check "
+            "the port and its baud rate."
         )

@@ -60,7 +60,7 @@ class _Entry(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     length: int = 1
     range: tuple[float | tuple[float, float], ...] | None = None
     unit: str = ""
-    maskType: str = ""  # noqa: N815  (Harp's name)
+    maskType: str = ""
     when: Literal["idle", "always"] = "always"
 
 
@@ -68,11 +68,11 @@ class _File(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     schema: int
     device: str
     description: str
-    whoAmI: int  # noqa: N815  (Harp's name)
-    firmwareVersion: str  # noqa: N815
+    whoAmI: int
+    firmwareVersion: str
     numbers: Literal["little-endian"]
-    groupMasks: dict[str, _Mask]  # noqa: N815
-    bitMasks: dict[str, _Mask]  # noqa: N815
+    groupMasks: dict[str, _Mask]
+    bitMasks: dict[str, _Mask]
     registers: dict[str, _Entry]
 
 
@@ -238,13 +238,17 @@ class Definition:
 
     @cached_property
     def sha256(self) -> str:
-        """Of everything on which host and device must agree; descriptions and order do not count."""
+        """Of everything on which both sides must agree, so not of descriptions and order."""
         agreed = [
             (r.address, r.name, r.type, r.length, r.reads, r.writes, r.ranges, r.when, r.unit)
             for r in sorted(self.registers.values(), key=lambda r: r.address)
         ]
         masks = [
-            (mask.name, mask.bits, sorted((value, name) for name, (value, _) in mask.members.items()))
+            (
+                mask.name,
+                mask.bits,
+                sorted((value, name) for name, (value, _) in mask.members.items()),
+            )
             for mask in sorted(self.masks.values(), key=lambda mask: mask.name)
         ]
         text = repr((SCHEMA, self.name, self.who_am_i, self.firmware_version, agreed, masks))
@@ -311,7 +315,7 @@ def _problem(register: Register, masks: Mapping[str, Mask]) -> str:
     low, high = _range_of(register.type)
     if not 0 <= register.address <= 255:
         return f"the address {register.address}, which is no byte"
-    if not (1 <= register.length and register.size <= MOST_BODY - 2):
+    if not (register.length >= 1 and register.size <= MOST_BODY - 2):
         return f"a length of {register.length}, which is not from 1 to what a frame holds"
     if len(register.ranges) != register.length:
         return f"{len(register.ranges)} ranges for {register.length} elements"

@@ -68,13 +68,14 @@ class Frame:
                 "at a time."
             )
         plain = _HEADER.pack(self.kind, self.sequence, self.nonce, len(self.body)) + self.body
-        return b"\0" + cobs.encode(plain + _check(self.kind, plain)) + b"\0"
+        stuffed: bytes = cobs.encode(plain + _check(self.kind, plain))
+        return b"\0" + stuffed + b"\0"
 
     @classmethod
     def decoded(cls, stuffed: bytes) -> Frame | None:
         """The frame that these bytes between two zeros are; None for a damaged one."""
         try:
-            plain = cobs.decode(stuffed)
+            plain: bytes = cobs.decode(stuffed)
         except cobs.DecodeError:
             return None
         if len(plain) < _HEADER.size or len(plain) > LONGEST:
@@ -87,7 +88,7 @@ class Frame:
 
 
 def _check(kind: int, plain: bytes) -> bytes:
-    """CRC-16/IBM-3740; CRC-32 of a hello, which has no number, and of an upload, which has no ranges."""
+    """CRC-16/IBM-3740; CRC-32 of what neither number nor range protects: hello and upload."""
     if kind & ~REPLY in (Kind.HELLO, Kind.UPLOAD):
         return zlib.crc32(plain).to_bytes(4, "little")
     return binascii.crc_hqx(plain, 0xFFFF).to_bytes(2, "little")

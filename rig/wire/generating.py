@@ -1,4 +1,4 @@
-"""What follows from a device's definition: C header, Python module, tables of a page, byte vectors."""
+"""What follows from a device's definition: C header, Python module, tables, byte vectors."""
 
 from __future__ import annotations
 
@@ -65,8 +65,8 @@ def c_header(definition: Definition) -> str:
         "    float low, high;",
         "} tqd_range;",
         "",
-        "/* One register: bytes of an element, elements, its first range and whether each element has its own,",
-        "   where its value begins. */",
+        "/* One register: bytes of an element, elements, its first range, whether each element has",
+        "   its own, and where its value begins. */",
         "typedef struct {",
         "    uint8_t address, kind, bytes, length, access, ranges, each;",
         "    uint16_t offset;",
@@ -91,7 +91,10 @@ def c_header(definition: Definition) -> str:
 def python_module(definition: Definition) -> str:
     """Its masks as enumerations."""
     lines = [
-        f'"""What registers of {definition.name} hold. {_MADE}"""',
+        f'"""What registers of {definition.name} hold.',
+        "",
+        _MADE,
+        '"""',
         "",
         "from __future__ import annotations",
         "",
@@ -99,7 +102,7 @@ def python_module(definition: Definition) -> str:
     ]
     for mask in definition.masks.values():
         lines += ["", "", f"class {mask.name}({'IntFlag' if mask.bits else 'IntEnum'}):"]
-        lines += [f'    """{mask.description}"""', ""]
+        lines += [f'    """{mask.description.split(";")[0].rstrip(".")}."""', ""]
         lines += [f"    {name} = {value}" for name, (value, _) in mask.members.items()]
     return "\n".join(lines) + "\n"
 

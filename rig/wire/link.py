@@ -1,4 +1,4 @@
-"""A device in a thread of its own: commands with deadlines, records, a heartbeat, and reconnecting."""
+"""A device in a thread of its own: commands with deadlines, records, heartbeat, reconnecting."""
 
 from __future__ import annotations
 

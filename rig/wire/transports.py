@@ -107,8 +107,10 @@ class SerialTransport:
 
     def _wait(self, within_s: float) -> None:
         if os.name == "posix":
-            ready, _, _ = select.select([self._port.fileno(), self._waking], [], [], within_s)
-            if self._waking in ready:
+            ready, _, _ = select.select(
+                [self._port.fileno(), self._waking.fileno()], [], [], within_s
+            )
+            if self._waking.fileno() in ready:
                 self._waking.clear()
             return
         end_s = self.now_s() + within_s
@@ -175,10 +177,11 @@ class SocketTransport:
     def read(self, within_s: float) -> bytes:
         """See `Transport`."""
         try:
-            ready, _, _ = select.select([self._socket, self._waking], [], [], within_s)
-            if self._waking in ready:
+            of = self._socket.fileno()
+            ready, _, _ = select.select([of, self._waking.fileno()], [], [], within_s)
+            if self._waking.fileno() in ready:
                 self._waking.clear()
-            if self._socket not in ready:
+            if of not in ready:
                 return b""
             data = self._socket.recv(_MOST)
         except (OSError, ValueError):

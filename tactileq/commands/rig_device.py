@@ -65,7 +65,9 @@ def _emulate(kind: Literal["process", "m7", "stm32"], baud: int | None, port: in
     from rig.device.emulating import Emulator
 
     with Emulator(kind, baud=baud, port=port) as emulator:
-        print(f"emulated device ({kind}, simulated) at {emulator.address}; Ctrl-C ends it", flush=True)
+        print(
+            f"emulated device ({kind}, simulated) at {emulator.address}; Ctrl-C ends it", flush=True
+        )
         try:
             while emulator.runs:
                 time.sleep(0.2)
@@ -77,9 +79,7 @@ def _emulate(kind: Literal["process", "m7", "stm32"], baud: int | None, port: in
     raise ValueError("expected the emulated device to run, got its end; start it again.")
 
 
-def _write_firmware(
-    kind: Literal["process", "m7", "stm32"], file: Path, baud: int | None
-) -> None:
+def _write_firmware(kind: Literal["process", "m7", "stm32"], file: Path, baud: int | None) -> None:
     from rig.device.emulating import USUAL_BAUD, build_firmware, check_baud
 
     if kind == "process":

@@ -1,4 +1,4 @@
-"""A host that is killed while the wall pushes, and how long the device pulled on by its own clock."""
+"""A host that is killed while the wall pushes, and how long the device pulled on."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The large numbers of tests/rig/device: `python -m tests.rig.device.large` (about five minutes)."""
+"""The large numbers: `python -m tests.rig.device.large` (about five minutes)."""
 
 from __future__ import annotations
 

@@ -25,10 +25,10 @@ def hosts_samples(
 ) -> np.ndarray:
     """What the host renders from the same readings, from a model's first sample on."""
     renderer = Renderer(model, limits=DEVICE_LIMITS, stream=stream, single=single)
-    values, tick = joined(blocks), blocks[0].tick
+    values, tick, every = joined(blocks), blocks[0].tick, blocks[0].every
     assert tick <= begin_tick
     samples = []
-    for n in range(begin_tick - tick, values.size, READ_TICKS):
+    for n in range((begin_tick - tick) // every, values.size, READ_TICKS // every):
         renderer.read(float(values["speed_mm_s"][n]), float(values["force_n"][n]))
         samples.append(renderer.render_on(READ_TICKS))
     return np.concatenate(samples)
@@ -87,7 +87,9 @@ def test_a_second_model_takes_over_through_silence() -> None:
         lambda data: data[:5] + b"\x7f" + data[6:],
         lambda data: data[:24] + struct.pack("<d", 4000.0) + data[32:],
         lambda data: data[:72] + struct.pack("<d", float("inf")) + data[80:],  # no peak
-        lambda data: data[:104] + struct.pack("<d", -1.0) + data[112:],  # an axis that does not rise
+        lambda data: (
+            data[:104] + struct.pack("<d", -1.0) + data[112:]
+        ),  # an axis that does not rise
         lambda data: data[:-8] + struct.pack("<d", float("nan")),
         lambda data: data[:-8] + struct.pack("<d", 1e9),
     ],

@@ -12,6 +12,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
 from rig.wire.envelope import Frame
 from tests.rig.device.compiled import ROOT, compiled_walks
@@ -19,9 +20,14 @@ from tests.rig.device.compiled import ROOT, compiled_walks
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
 
 
-@pytest.fixture(scope="module")
-def walks(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return compiled_walks(tmp_path_factory.mktemp("walks"))
+@pytest.fixture(scope="session")
+def walks(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
+    """Compiled once for all workers."""
+    folder = tmp_path_factory.getbasetemp()
+    folder = folder if worker_id == "master" else folder.parent
+    with FileLock(folder / "walks.lock"):
+        program = folder / "walks"
+        return program if program.exists() else compiled_walks(folder)
 
 
 def told(program: Path, *arguments: object) -> dict[str, float]:
@@ -70,9 +76,7 @@ def test_a_silent_host_costs_heartbeat_and_ramp(walks: Path) -> None:
 
 def test_the_vectors_are_what_the_firmware_sends_and_takes(walks: Path) -> None:
     rows = json.loads((ROOT / "docs/device/vectors.json").read_text(encoding="utf-8"))["frames"]
-    lines = [
-        f"{row['kind']} {row['sequence']} {row['nonce']} {row['body'] or '-'}" for row in rows
-    ]
+    lines = [f"{row['kind']} {row['sequence']} {row['nonce']} {row['body'] or '-'}" for row in rows]
     run = subprocess.run(
         [walks, "frames"], input="\n".join(lines), capture_output=True, text=True, check=True
     )

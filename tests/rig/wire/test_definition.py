@@ -41,7 +41,10 @@ def changed(*keys: str, to: Any) -> dict[str, Any]:
     ("values", "facts"),
     [
         (changed("schema", to=2), {"expected": 1, "got": 2}),
-        (changed("registers", "State", "address", to=9), {"expected": "State", "got": [9, "Cause"]}),
+        (
+            changed("registers", "State", "address", to=9),
+            {"expected": "State", "got": [9, "Cause"]},
+        ),
         (changed("registers", "State", "address", to=256), {"expected": "State", "got": 256}),
         (changed("registers", "State", "type", to="U12"), {"got": "U12"}),
         (changed("registers", "State", "colour", to=1), {"got": "colour"}),
@@ -86,8 +89,11 @@ def test_what_both_must_agree_on_changes_the_hash(tmp_path: Path) -> None:
 def test_what_a_register_takes_it_gives_back(data: st.DataObject) -> None:
     register = data.draw(st.sampled_from(sorted(DEVICE.registers.values(), key=lambda r: r.name)))
     value = tuple(
-        data.draw(st.floats(low, high, width=32) if abs(low) < 1e30 else st.floats(width=32,
-                  allow_nan=False, allow_infinity=False))
+        data.draw(
+            st.floats(low, high, width=32)
+            if abs(low) < 1e30
+            else st.floats(width=32, allow_nan=False, allow_infinity=False)
+        )
         if register.type == "Float" and float(low).is_integer() and float(high).is_integer()
         else (low if register.type == "Float" else data.draw(st.integers(int(low), int(high))))
         for low, high in register.ranges

@@ -1,0 +1,222 @@
+"""The link's thread: deadlines, bounded queues, a cable that is pulled, and never arming again."""
+
+from __future__ import annotations
+
+import os
+import pty
+import threading
+import time
+import tty
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from modeling import InputError
+from rig.device.definition import DEVICE
+from rig.device.emulating import Emulator
+from rig.device.models import device_model
+from rig.device.registers import Cause, Command, State
+from rig.wire.link import Link
+from rig.wire.transports import Transport, opened_transport
+from stimuli.planted.textures import planted_texture
+from tests.refusals import refused
+
+BAUD = 1_000_000
+PATIENCE_S = 10.0
+
+
+class Cable:
+    """Between host and device: a pseudo-terminal of its own, which can be pulled and plugged in."""
+
+    def __init__(self, device: str, folder: Path) -> None:
+        self.path = folder / "port"
+        self._device = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        self._ours = self._theirs = -1
+        self.stalled = False
+        self._closing = threading.Event()
+        self._lock = threading.Lock()
+        self.plug()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def plug(self) -> None:
+        with self._lock:
+            self._ours, self._theirs = pty.openpty()
+            tty.setraw(self._theirs)
+            os.set_blocking(self._ours, False)
+            self.path.unlink(missing_ok=True)
+            self.path.symlink_to(os.ttyname(self._theirs))
+
+    def pull(self) -> None:
+        with self._lock:
+            self.path.unlink()
+            os.close(self._theirs)
+            os.close(self._ours)
+            self._ours = -1
+
+    def close(self) -> None:
+        self._closing.set()
+        self._thread.join()
+        if self._ours >= 0:
+            self.pull()
+        os.close(self._device)
+
+    def _run(self) -> None:
+        while not self._closing.is_set():
+            moved = False
+            with self._lock:
+                if self._ours >= 0 and not self.stalled:
+                    moved = self._pass(self._device, self._ours) | self._pass(
+                        self._ours, self._device
+                    )
+            if not moved:
+                time.sleep(0.0005)
+
+    @staticmethod
+    def _pass(source: int, to: int) -> bool:
+        try:
+            os.write(to, os.read(source, 4096))
+        except OSError:
+            return False
+        return True
+
+
+@pytest.fixture
+def cable(tmp_path: Path) -> Iterator[Cable]:
+    with Emulator("process") as device:
+        found = Cable(device.address, tmp_path)
+        try:
+            yield found
+        finally:
+            found.close()
+
+
+@contextmanager
+def linked(cable: Cable) -> Iterator[Link]:
+    def opening() -> Transport:
+        return opened_transport(str(cable.path), BAUD)
+
+    with Link(opening, DEVICE) as link:
+        yield link
+
+
+def until(met: Callable[[], bool], *, what: str) -> None:
+    end_s = time.monotonic() + PATIENCE_S
+    while not met():
+        assert time.monotonic() < end_s, what
+        time.sleep(0.01)
+
+
+def running(link: Link) -> None:
+    for command in (Command.HOME, Command.ARM, Command.SHOW):
+        link.write("Command", command)
+    assert link.read("State") == State.RUNNING
+
+
+def during_arming(link: Link) -> None:
+    for command in (Command.HOME, Command.ARM):
+        link.write("Command", command)
+
+
+def during_an_upload(link: Link) -> None:
+    assert link.hello is not None
+    model = device_model(planted_texture("canvas"), link.hello)
+    while True:
+        link.upload(model.data, model.hash)
+
+
+def during_reads(link: Link) -> None:
+    while True:
+        link.read("State")
+
+
+def during_writes(link: Link) -> None:
+    while True:
+        link.write("Source", 0)
+
+
+@pytest.mark.parametrize("what", [during_reads, during_writes, during_an_upload, during_arming])
+def test_a_cable_that_is_pulled_is_a_fault_and_arms_nothing_when_it_is_back(
+    cable: Cable, what: Callable[[Link], None]
+) -> None:
+    with linked(cable) as link:
+        running(link) if what is not during_arming else None
+        pulling = threading.Timer(0.15, cable.pull)
+        pulling.start()
+        if what is during_arming:
+            what(link)
+            pulling.join()
+        else:
+            with refused(InputError, expected="device"):
+                while True:
+                    link.beat()
+                    what(link)
+        until(lambda: not link.connected, what="the link does not notice")
+        with refused(InputError, expected="device"):
+            link.read("State")
+        time.sleep(0.2)
+        cable.plug()
+        until(lambda: link.connected, what="the link does not connect again")
+        assert link.read("State") == State.FAULT
+        assert link.read("Cause") in (Cause.LINK, Cause.HOST)
+        assert link.read("Current") == (0.0, 0.0)
+        assert link.counts()["lost"] == 1
+        assert len(link.faults()) == 1
+
+
+def test_a_command_has_a_deadline_and_the_queue_an_end(cable: Cable) -> None:
+    with linked(cable) as link:
+        link.read("State")
+        cable.stalled = True
+        begun_s = time.monotonic()
+        with refused(InputError, expected="device"):
+            link.read("State", within_s=0.2)
+        assert time.monotonic() - begun_s < 0.45
+        refusals: list[str] = []
+
+        def ask() -> None:
+            try:
+                link.read("State", within_s=0.1)
+            except InputError as error:
+                refusals.append(str(error))
+
+        threads = [threading.Thread(target=ask) for _ in range(40)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert len(refusals) == 40
+        cable.stalled = False
+
+
+def test_a_hanging_control_loop_is_noticed_while_the_links_thread_lives(cable: Cable) -> None:
+    with linked(cable) as link:
+        running(link)
+        for _ in range(10):
+            link.beat()
+            time.sleep(0.05)
+        assert link.read("State") == State.RUNNING
+        until(lambda: link.read("State") == State.FAULT, what="it is not noticed")
+        assert link.read("Cause") == Cause.HEARTBEAT
+        late = int(link.read("FaultTick")) - int(link.read("HeardTick"))  # type: ignore[arg-type]
+        assert late < 500  # the link itself was never silent
+        assert link.counts()["lost"] == 0
+
+
+def test_records_come_without_a_gap(cable: Cable) -> None:
+    with linked(cable) as link:
+        running(link)
+        link.write("EventRate", 1000)
+        blocks, end_s = [], time.monotonic() + 0.6
+        while time.monotonic() < end_s:
+            link.beat()
+            time.sleep(0.01)
+            blocks += link.blocks()
+        link.write("EventRate", 0)
+        ends = [block.number + block.values.size for block in blocks]
+        assert [block.number for block in blocks[1:]] == ends[:-1]
+        assert ends[-1] > 400
+        assert link.counts()["missing"] == link.counts()["dropped"] == 0
+        assert link.read("RecordsLost") == 0
