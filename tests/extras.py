@@ -36,6 +36,11 @@ NEEDING = {
         "rig/sound/test_signals.py::test_what_is_not_compensated_yet",
         "rig/test_inventory.py",
     ),
+    "cobs": (
+        "rig/device",
+        "rig/wire",
+        "test_docs_tables.py",
+    ),
     "serial": (
         "rig/hand/test_evdev.py::test_serial_ports",
         "rig/hand/test_serial_sensor.py",

@@ -26,7 +26,7 @@ _WORST_BAUD = 0.02
 
 
 @dataclass(frozen=True)
-class Board:
+class QemuBoard:
     """A micro-controller that QEMU emulates.
 
     Parameters
@@ -45,14 +45,14 @@ class Board:
     options: tuple[str, ...]
 
 
-BOARDS: dict[str, Board] = {
-    "m7": Board(
+BOARDS: dict[str, QemuBoard] = {
+    "m7": QemuBoard(
         "mps2-an500",
         "mps2",
         25e6,
         ("-mcpu=cortex-m7", "-mfpu=fpv5-d16", "-DTQ_REAL=double", "-DTQ_NUMBER=double"),
     ),
-    "stm32": Board(
+    "stm32": QemuBoard(
         "netduinoplus2",
         "stm32f405",
         84e6,

@@ -17,7 +17,7 @@ import time
 import tty
 from contextlib import suppress
 
-from rig.device.virtual import Board
+from rig.device.virtual import VirtualBoard
 from rig.wire.transports import SOCKET
 
 HOST = "127.0.0.1"
@@ -30,13 +30,13 @@ def main() -> None:
     kind, baud, port = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the input's end is what ends it
     if kind == "process":
-        _run(Board(entropy=int.from_bytes(os.urandom(4)), baud=baud), port)
+        _run(VirtualBoard(entropy=int.from_bytes(os.urandom(4)), baud=baud), port)
     else:
         machine, firmware = kind.split(":", 1)
         _run_qemu(machine, firmware, port)
 
 
-def _run(board: Board, port: int) -> None:
+def _run(board: VirtualBoard, port: int) -> None:
     if port:
         _serve(board, port)
     else:
@@ -49,7 +49,7 @@ def _run(board: Board, port: int) -> None:
     board.shut()
 
 
-def _serve(board: Board, port: int) -> None:
+def _serve(board: VirtualBoard, port: int) -> None:
     """One host at a time; the device goes on without one."""
     with socket.create_server((HOST, port)) as server:
         _say(f"{SOCKET}{HOST}:{server.getsockname()[1]}")

@@ -8,7 +8,7 @@ from __future__ import annotations
 from enum import IntEnum, IntFlag
 
 
-class State(IntEnum):
+class DeviceState(IntEnum):
     """States of rig/force/force.h."""
 
     BOOT = 0
@@ -19,7 +19,7 @@ class State(IntEnum):
     FAULT = 5
 
 
-class Command(IntEnum):
+class DeviceCommand(IntEnum):
     """What the host asks for."""
 
     NONE = 0
@@ -31,7 +31,7 @@ class Command(IntEnum):
     HOME = 6
 
 
-class Cause(IntEnum):
+class DeviceCause(IntEnum):
     """Why the device let go."""
 
     NONE = 0
@@ -53,7 +53,7 @@ class Cause(IntEnum):
     STUCK = 16
 
 
-class Source(IntEnum):
+class DeviceSource(IntEnum):
     """What the vibrator plays."""
 
     NOTHING = 0
@@ -61,7 +61,7 @@ class Source(IntEnum):
     HOST = 2
 
 
-class Simulation(IntEnum):
+class DeviceSimulation(IntEnum):
     """What goes wrong from now on, of a simulated board only."""
 
     NONE = 0
@@ -74,7 +74,7 @@ class Simulation(IntEnum):
     UNPLUGGED = 7
 
 
-class Status(IntEnum):
+class DeviceStatus(IntEnum):
     """First byte of every reply."""
 
     OK = 0
@@ -92,7 +92,7 @@ class Status(IntEnum):
     FULL = 12
 
 
-class Flags(IntFlag):
+class DeviceFlags(IntFlag):
     """Of a record in an event frame."""
 
     CONTACT = 1

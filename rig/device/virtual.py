@@ -32,7 +32,7 @@ def compiled_device() -> Any:
     return _device
 
 
-class Board:
+class VirtualBoard:
     """A simulated board, switched on.
 
     Parameters
@@ -70,13 +70,13 @@ class VirtualTransport:
 
     Parameters
     ----------
-    board : Board, optional
+    board : VirtualBoard, optional
     """
 
     name = "virtual device"
 
-    def __init__(self, board: Board | None = None) -> None:
-        self.board = board or Board()
+    def __init__(self, board: VirtualBoard | None = None) -> None:
+        self.board = board or VirtualBoard()
         self._buffer = self.board.ffi.new("uint8_t[]", _MOST)
         self.ticks = 0
         self.unplugged = False

@@ -16,7 +16,7 @@ import numpy as np
 
 from modeling.errors import InputError
 from rig.wire.definition import Definition, Register, Value
-from rig.wire.envelope import REPLY, Frame, FrameReader, Kind
+from rig.wire.envelope import REPLY, Kind, WireFrame, WireReader
 from rig.wire.transports import Transport, TransportLost
 
 DEADLINE_S = 0.3
@@ -105,7 +105,7 @@ class Conversation:
     def __init__(self, transport: Transport, definition: Definition) -> None:
         self._transport = transport
         self._definition = definition
-        self._reader = FrameReader()
+        self._reader = WireReader()
         self._heard = 0  # bytes
         self._sequence = 0
         self._nonce = 0
@@ -132,7 +132,7 @@ class Conversation:
         TransportLost
         """
         self._sequence, self._nonce = 0, 0
-        frame = Frame(Kind.HELLO, 0, 0)
+        frame = WireFrame(Kind.HELLO, 0, 0)
         before = self._heard
         reply = self._reply(frame, within_s=within_s, again_s=_HELLO_AGAIN_S)
         if reply is None:
@@ -211,7 +211,7 @@ class Conversation:
             Without a reply.
         """
         self._sequence = (self._sequence + 1) & 0xFFFF
-        frame = Frame(kind, self._sequence, self._nonce, body)
+        frame = WireFrame(kind, self._sequence, self._nonce, body)
         long = kind == Kind.UPLOAD
         within_s, again_s = (UPLOAD_S, UPLOAD_AGAIN_S) if long else (DEADLINE_S, AGAIN_S)
         reply = self._reply(frame, within_s=within_s, again_s=again_s)
@@ -243,10 +243,10 @@ class Conversation:
         self._blocks.clear()
         return taken
 
-    def _reply(self, frame: Frame, *, within_s: float, again_s: float) -> Frame | None:
+    def _reply(self, frame: WireFrame, *, within_s: float, again_s: float) -> WireFrame | None:
         data, now_s = frame.encoded(), self._transport.now_s()
         end_s, send_s, sent = now_s + within_s, now_s, 0
-        found: Frame | None = None
+        found: WireFrame | None = None
         while now_s < end_s:
             if now_s >= send_s:
                 self._transport.write(data)
@@ -265,19 +265,19 @@ class Conversation:
                 break
         return found
 
-    def _received(self, within_s: float) -> list[Frame]:
+    def _received(self, within_s: float) -> list[WireFrame]:
         data = self._transport.read(max(0.0, within_s))
         self._heard += len(data)
         return list(self._reader.feed(data))
 
     @staticmethod
-    def _answers(got: Frame, frame: Frame) -> bool:
+    def _answers(got: WireFrame, frame: WireFrame) -> bool:
         of = got.kind == frame.kind | REPLY and got.sequence == frame.sequence and bool(got.body)
         if not of or frame.kind == Kind.HELLO:
             return of
         return got.nonce == frame.nonce or got.body[0] == _STATUS_NONCE
 
-    def _take(self, frame: Frame) -> None:
+    def _take(self, frame: WireFrame) -> None:
         """A frame that answers nothing: records, or what is out of date."""
         if frame.kind != Kind.EVENT | REPLY or frame.nonce != self._nonce:
             return

@@ -77,7 +77,7 @@ class _File(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 @dataclass(frozen=True)
-class Mask:
+class RegisterMask:
     """Names of values, or of bits, with what each means.
 
     Parameters
@@ -183,7 +183,7 @@ class Definition:
     description: str
     who_am_i: int
     firmware_version: tuple[int, int]
-    masks: Mapping[str, Mask]
+    masks: Mapping[str, RegisterMask]
     registers: Mapping[str, Register]
 
     @classmethod
@@ -260,13 +260,13 @@ class Definition:
         return int(self.sha256[:16], 16)
 
 
-def _mask(name: str, mask: _Mask, bits: bool) -> Mask:
+def _mask(name: str, mask: _Mask, bits: bool) -> RegisterMask:
     given = mask.bits if bits else mask.values
     members = {
         member: (one, "") if isinstance(one, int) else (one.value, one.description)
         for member, one in given.items()
     }
-    return Mask(name, mask.description, members, bits)
+    return RegisterMask(name, mask.description, members, bits)
 
 
 def _register(name: str, entry: _Entry) -> Register:
@@ -296,7 +296,9 @@ def _range_of(kind: Kind) -> tuple[float, float]:
     return (0, 2**bits - 1) if kind[0] == "U" else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
 
 
-def _check(registers: Mapping[str, Register], masks: Mapping[str, Mask], path: Path) -> None:
+def _check(
+    registers: Mapping[str, Register], masks: Mapping[str, RegisterMask], path: Path
+) -> None:
     seen: dict[int, str] = {}
     for name, register in registers.items():
         problem = _problem(register, masks)
@@ -310,7 +312,7 @@ def _check(registers: Mapping[str, Register], masks: Mapping[str, Mask], path: P
         seen[register.address] = name
 
 
-def _problem(register: Register, masks: Mapping[str, Mask]) -> str:
+def _problem(register: Register, masks: Mapping[str, RegisterMask]) -> str:
     """What is wrong with it; empty for nothing."""
     low, high = _range_of(register.type)
     if not 0 <= register.address <= 255:

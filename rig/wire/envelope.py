@@ -34,7 +34,7 @@ REPLY = 0x80
 
 
 @dataclass(frozen=True)
-class Frame:
+class WireFrame:
     """One frame.
 
     Parameters
@@ -72,7 +72,7 @@ class Frame:
         return b"\0" + stuffed + b"\0"
 
     @classmethod
-    def decoded(cls, stuffed: bytes) -> Frame | None:
+    def decoded(cls, stuffed: bytes) -> WireFrame | None:
         """The frame that these bytes between two zeros are; None for a damaged one."""
         try:
             plain: bytes = cobs.decode(stuffed)
@@ -94,7 +94,7 @@ def _check(kind: int, plain: bytes) -> bytes:
     return binascii.crc_hqx(plain, 0xFFFF).to_bytes(2, "little")
 
 
-class FrameReader:
+class WireReader:
     """Finds frames in bytes as they come; what is damaged is counted."""
 
     def __init__(self) -> None:
@@ -103,7 +103,7 @@ class FrameReader:
         self.good = 0
         self.bad = 0
 
-    def feed(self, data: bytes) -> Iterator[Frame]:
+    def feed(self, data: bytes) -> Iterator[WireFrame]:
         """The frames that these bytes complete."""
         *ended, rest = data.split(b"\0")
         for part in ended:
@@ -118,13 +118,13 @@ class FrameReader:
             self._too_long = True
             self._bytes.clear()
 
-    def _take(self) -> Frame | None:
+    def _take(self) -> WireFrame | None:
         stuffed, too_long = bytes(self._bytes), self._too_long
         self._bytes.clear()
         self._too_long = False
         if not stuffed and not too_long:
             return None
-        frame = None if too_long else Frame.decoded(stuffed)
+        frame = None if too_long else WireFrame.decoded(stuffed)
         self.good += frame is not None
         self.bad += frame is None
         return frame

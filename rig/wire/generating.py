@@ -6,8 +6,8 @@ import json
 import re
 from collections.abc import Iterator
 
-from rig.wire.definition import Definition, Mask, Register
-from rig.wire.envelope import REPLY, Frame, Kind
+from rig.wire.definition import Definition, Register, RegisterMask
+from rig.wire.envelope import REPLY, Kind, WireFrame
 
 _MADE = "Made from device.yml by `make docs-tables`; do not edit."
 _LICENCE = "Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later"
@@ -101,7 +101,7 @@ def python_module(definition: Definition) -> str:
         "from enum import IntEnum, IntFlag",
     ]
     for mask in definition.masks.values():
-        lines += ["", "", f"class {mask.name}({'IntFlag' if mask.bits else 'IntEnum'}):"]
+        lines += ["", "", f"class Device{mask.name}({'IntFlag' if mask.bits else 'IntEnum'}):"]
         lines += [f'    """{mask.description.split(";")[0].rstrip(".")}."""', ""]
         lines += [f"    {name} = {value}" for name, (value, _) in mask.members.items()]
     return "\n".join(lines) + "\n"
@@ -158,23 +158,23 @@ def vectors(definition: Definition) -> str:
     return json.dumps(head | {"frames": rows}, indent=1, ensure_ascii=False) + "\n"
 
 
-def _frames(definition: Definition) -> Iterator[tuple[str, Frame]]:
-    yield "hello", Frame(Kind.HELLO, 0, 0)
+def _frames(definition: Definition) -> Iterator[tuple[str, WireFrame]]:
+    yield "hello", WireFrame(Kind.HELLO, 0, 0)
     number = 0
     for r in sorted(definition.registers.values(), key=lambda r: r.address):
         number = 65535 if number == 1 else (number + 1) & 0xFFFF  # wraps early
         if r.reads:
-            yield f"read {r.name}", Frame(Kind.READ, number, _NONCE, bytes([r.address]))
+            yield f"read {r.name}", WireFrame(Kind.READ, number, _NONCE, bytes([r.address]))
         for which in (0, 1) if r.writes else ():
             whole = r.type != "Float"
             value = tuple(int(one[which]) if whole else one[which] for one in r.ranges)
             data = r.encoded(value)
             body = bytes([r.address]) + data
-            yield f"write {r.name}", Frame(Kind.WRITE, number, _NONCE, body)
-            reply = Frame(Kind.WRITE | REPLY, number, _NONCE, b"\0" + body)
+            yield f"write {r.name}", WireFrame(Kind.WRITE, number, _NONCE, body)
+            reply = WireFrame(Kind.WRITE | REPLY, number, _NONCE, b"\0" + body)
             yield f"reply to write {r.name}", reply
-    yield "an upload", Frame(Kind.UPLOAD, 7, _NONCE, bytes(range(236)))
-    yield "an event", Frame(Kind.EVENT | REPLY, 65535, _NONCE, bytes(236))
+    yield "an upload", WireFrame(Kind.UPLOAD, 7, _NONCE, bytes(range(236)))
+    yield "an event", WireFrame(Kind.EVENT | REPLY, 65535, _NONCE, bytes(236))
 
 
 def _differ(register: Register) -> bool:
@@ -194,7 +194,7 @@ def _snake(name: str) -> str:
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
 
 
-def _c_mask(mask: Mask) -> list[str]:
+def _c_mask(mask: RegisterMask) -> list[str]:
     return [
         f"/* {mask.description} */",
         "enum {",

@@ -111,7 +111,7 @@ def _ask(address: str, baud: int) -> None:
 
 
 def _print(address: str, hello: Hello, values: dict[str, Value]) -> None:
-    from rig.device.registers import Cause, State
+    from rig.device.registers import DeviceCause, DeviceState
 
     major, minor = hello.firmware_version
     precision = "double" if hello.real_size == 8 else "single"
@@ -119,7 +119,7 @@ def _print(address: str, hello: Hello, values: dict[str, Value]) -> None:
         f"{address}: device {hello.who_am_i}, firmware {major}.{minor}, schema "
         f"{hello.schema_hash:016x}, {hello.tick_rate_hz:g} Hz, {precision} precision"
     )
-    state, cause = State(int(values["State"])), Cause(int(values["Cause"]))  # type: ignore[arg-type]
+    state, cause = DeviceState(int(values["State"])), DeviceCause(int(values["Cause"]))  # type: ignore[arg-type]
     print(f"state {state.name}, last cause {cause.name}")
     for name in _SHOWN[2:]:
         print(f"{name} {values[name]}")

@@ -8,36 +8,42 @@ from typing import Any
 import numpy as np
 
 from rig.device.definition import DEVICE
-from rig.device.registers import Cause, Command, Simulation, Source, State
-from rig.device.virtual import TICK_HZ, Board, VirtualTransport
+from rig.device.registers import (
+    DeviceCause,
+    DeviceCommand,
+    DeviceSimulation,
+    DeviceSource,
+    DeviceState,
+)
+from rig.device.virtual import TICK_HZ, VirtualBoard, VirtualTransport
 from rig.wire.conversation import RECORD, Block, Conversation
 
 
 class Talk(Conversation):
     """With the board's transport, and words for what tests do."""
 
-    def __init__(self, board: Board | None = None) -> None:
+    def __init__(self, board: VirtualBoard | None = None) -> None:
         self.wire = VirtualTransport(board)
         super().__init__(self.wire, DEVICE)
         self.hello()
 
-    def ask(self, command: Command) -> State:
+    def ask(self, command: DeviceCommand) -> DeviceState:
         """The state after a command."""
-        return State(int(self.write("Command", command)))  # type: ignore[arg-type]
+        return DeviceState(int(self.write("Command", command)))  # type: ignore[arg-type]
 
     def number(self, name: str) -> Any:
         """A register of one number."""
         return self.read(name)
 
     @property
-    def state(self) -> State:
+    def state(self) -> DeviceState:
         """As it is now."""
-        return State(self.number("State"))
+        return DeviceState(self.number("State"))
 
     @property
-    def cause(self) -> Cause:
+    def cause(self) -> DeviceCause:
         """Of the last fault."""
-        return Cause(self.number("Cause"))
+        return DeviceCause(self.number("Cause"))
 
     def run(self, seconds: float) -> None:
         """Look after the device for so long."""
@@ -48,17 +54,19 @@ class Talk(Conversation):
 
     def push(self) -> None:
         """Show the wall, and stroke until it pushes."""
-        assert self.ask(Command.HOME) == State.IDLE
-        assert self.ask(Command.ARM) == State.ARMED
-        assert self.ask(Command.SHOW) == State.RUNNING
+        assert self.ask(DeviceCommand.HOME) == DeviceState.IDLE
+        assert self.ask(DeviceCommand.ARM) == DeviceState.ARMED
+        assert self.ask(DeviceCommand.SHOW) == DeviceState.RUNNING
         self.run(1.5)
         assert self.number("Force") > 0.2
 
-    def spoil(self, what: Simulation) -> None:
+    def spoil(self, what: DeviceSimulation) -> None:
         """Something goes wrong with the board."""
         self.write("Simulate", what)
 
-    def recorded(self, seconds: float, *, source: Source = Source.NOTHING) -> list[Block]:
+    def recorded(
+        self, seconds: float, *, source: DeviceSource = DeviceSource.NOTHING
+    ) -> list[Block]:
         """Records of so long, at every tick."""
         self.write("Source", source)
         self.write("EventRate", TICK_HZ)

@@ -19,7 +19,7 @@ from modeling import InputError
 from rig.device.definition import DEVICE
 from rig.device.emulating import KINDS, Emulator, Kind, check_baud
 from rig.device.models import device_model
-from rig.device.registers import Command, Source, State
+from rig.device.registers import DeviceCommand, DeviceSource, DeviceState
 from rig.wire.conversation import Conversation
 from rig.wire.transports import opened_transport
 from stimuli.planted.textures import planted_texture
@@ -49,7 +49,7 @@ def test_a_client_written_from_the_page_alone_talks_to_it(device: Emulator) -> N
         assert client.hello()["SchemaHash"] == DEVICE.schema_hash
         for command in (6, 1, 2):
             client.write(10, bytes([command]))
-        assert client.read(8) == bytes([State.RUNNING])
+        assert client.read(8) == bytes([DeviceState.RUNNING])
         client.write(16, (500).to_bytes(2, "little"))
         records = client.records(0.3)
         client.write(16, bytes(2))
@@ -59,7 +59,7 @@ def test_a_client_written_from_the_page_alone_talks_to_it(device: Emulator) -> N
         assert set(np.diff(ticks)) == {10}
         assert all(flag & 32 for flag in flags)
         time.sleep(0.1)
-        assert client.read(8) == bytes([State.FAULT])
+        assert client.read(8) == bytes([DeviceState.FAULT])
         client.write(10, bytes([4]))
     finally:
         client.close()
@@ -74,14 +74,14 @@ def test_it_renders_the_bits_of_the_host(device: Emulator) -> None:
         talk = Conversation(transport, DEVICE)
         hello = talk.hello()
         upload = device_model(model, hello)
-        if talk.read("State") == State.FAULT:
-            talk.write("Command", Command.CLEAR)
+        if talk.read("State") == DeviceState.FAULT:
+            talk.write("Command", DeviceCommand.CLEAR)
             time.sleep(0.1)
-        for command in (Command.HOME, Command.ARM, Command.SHOW):
+        for command in (DeviceCommand.HOME, DeviceCommand.ARM, DeviceCommand.SHOW):
             talk.write("Command", command)
         talk.write("EventRate", 5000 if hello.real_size == 4 else 1000)
         talk.upload(upload.data, upload.hash)
-        talk.write("Source", Source.MODEL)
+        talk.write("Source", DeviceSource.MODEL)
         blocks, end_s = talk.blocks(), time.monotonic() + 1.6
         while time.monotonic() < end_s:
             talk.write("Heartbeat", 1)
@@ -89,8 +89,8 @@ def test_it_renders_the_bits_of_the_host(device: Emulator) -> None:
             blocks += talk.blocks()
         begin = talk.read("ModelTick")
         talk.write("EventRate", 0)
-        talk.write("Source", Source.NOTHING)
-        talk.write("Command", Command.STOP)
+        talk.write("Source", DeviceSource.NOTHING)
+        talk.write("Command", DeviceCommand.STOP)
     finally:
         transport.close()
     assert isinstance(begin, int)
@@ -144,13 +144,13 @@ def test_instructions_are_those_of_the_page(device: Emulator) -> None:
             talk = Conversation(transport, DEVICE)
             hello = talk.hello()
             counted = {}
-            for command_ in (Command.HOME, Command.ARM, Command.SHOW):
+            for command_ in (DeviceCommand.HOME, DeviceCommand.ARM, DeviceCommand.SHOW):
                 talk.write("Command", command_)
             counted["force alone"] = per_tick(talk)
             for layers in (1, 4, 8):
                 upload = device_model(layered_texture(layers), hello)
                 talk.upload(upload.data, upload.hash)
-                talk.write("Source", Source.MODEL)
+                talk.write("Source", DeviceSource.MODEL)
                 counted[f"{layers} layer{'s' * (layers > 1)}"] = per_tick(talk)
             transport.close()
         finally:

@@ -8,8 +8,15 @@ import pytest
 from modeling import InputError
 from rig.device.definition import DEVICE
 from rig.device.models import device_model
-from rig.device.registers import Cause, Command, Simulation, Source, State, Status
-from rig.device.virtual import TICK_HZ, Board, VirtualTransport
+from rig.device.registers import (
+    DeviceCause,
+    DeviceCommand,
+    DeviceSimulation,
+    DeviceSource,
+    DeviceState,
+    DeviceStatus,
+)
+from rig.device.virtual import TICK_HZ, VirtualBoard, VirtualTransport
 from rig.wire.conversation import Conversation, DeviceRefused
 from rig.wire.transports import TransportLost
 from stimuli.planted.textures import planted_texture
@@ -18,53 +25,55 @@ from tests.rig.device.talking import Talk, joined
 
 RELEASE_TICKS = 100  # 20 ms
 MOST_TICKS = {  # from what goes wrong to no current
-    Simulation.STUCK: TICK_HZ // 2,
-    Simulation.JUMP: RELEASE_TICKS + 2,
-    Simulation.FLIPPED: TICK_HZ,
-    Simulation.MOTOR: RELEASE_TICKS + 3,
-    Simulation.UNPLUGGED: RELEASE_TICKS + 2,
+    DeviceSimulation.STUCK: TICK_HZ // 2,
+    DeviceSimulation.JUMP: RELEASE_TICKS + 2,
+    DeviceSimulation.FLIPPED: TICK_HZ,
+    DeviceSimulation.MOTOR: RELEASE_TICKS + 3,
+    DeviceSimulation.UNPLUGGED: RELEASE_TICKS + 2,
 }
 CAUSES = {
-    Simulation.STUCK: {Cause.STUCK},
-    Simulation.JUMP: {Cause.JUMP},
-    Simulation.FLIPPED: {Cause.WORKSPACE, Cause.SPEED},
-    Simulation.MOTOR: {Cause.NOT_WRITTEN},
-    Simulation.UNPLUGGED: {Cause.JUMP, Cause.NOT_READ},
+    DeviceSimulation.STUCK: {DeviceCause.STUCK},
+    DeviceSimulation.JUMP: {DeviceCause.JUMP},
+    DeviceSimulation.FLIPPED: {DeviceCause.WORKSPACE, DeviceCause.SPEED},
+    DeviceSimulation.MOTOR: {DeviceCause.NOT_WRITTEN},
+    DeviceSimulation.UNPLUGGED: {DeviceCause.JUMP, DeviceCause.NOT_READ},
 }
 
 
 @pytest.mark.parametrize("what", MOST_TICKS)
-def test_a_device_that_goes_wrong_lets_go_and_stays_so(what: Simulation) -> None:
+def test_a_device_that_goes_wrong_lets_go_and_stays_so(what: DeviceSimulation) -> None:
     talk = Talk()
     talk.push()
     begun = talk.number("Tick")
     talk.spoil(what)
-    if what == Simulation.FLIPPED:  # harmless until the hand leaves the wall: then it is pulled on
+    if (
+        what == DeviceSimulation.FLIPPED
+    ):  # harmless until the hand leaves the wall: then it is pulled on
         talk.write("Stroke", (60.0, 0.5, 0.0))
     talk.run(1.2)
-    assert talk.state == State.FAULT
+    assert talk.state == DeviceState.FAULT
     assert talk.cause in CAUSES[what]
     assert 0 < talk.number("ZeroTick") - begun <= MOST_TICKS[what]
     assert talk.read("Current") == (0.0, 0.0)
-    assert talk.number("ShutdownError") == (1 if what == Simulation.MOTOR else 0)
-    talk.spoil(Simulation.NONE)
+    assert talk.number("ShutdownError") == (1 if what == DeviceSimulation.MOTOR else 0)
+    talk.spoil(DeviceSimulation.NONE)
     talk.run(0.5)
-    assert talk.state == State.FAULT  # latched
-    for command in (Command.ARM, Command.SHOW, Command.HIDE):
+    assert talk.state == DeviceState.FAULT  # latched
+    for command in (DeviceCommand.ARM, DeviceCommand.SHOW, DeviceCommand.HIDE):
         with pytest.raises(DeviceRefused) as told:
             talk.ask(command)
-        assert told.value.status == Status.STATE
+        assert told.value.status == DeviceStatus.STATE
 
 
 def test_counters_that_wrap_are_no_fault() -> None:
     """Both are 100 counts before their end where the tool rests, and pass it at once."""
     talk = Talk()
-    talk.spoil(Simulation.WRAPPED)
+    talk.spoil(DeviceSimulation.WRAPPED)
     talk.wire.step(2)
     talk.hello()
     talk.push()
     values = joined(talk.recorded(4.0))
-    assert talk.state == State.RUNNING
+    assert talk.state == DeviceState.RUNNING
     assert np.ptp(values["x_mm"]) > 100
     assert np.abs(np.diff(values["x_mm"])).max() < 0.2
 
@@ -74,8 +83,8 @@ def test_a_host_that_is_gone_is_noticed_after_a_tenth_of_a_second() -> None:
     talk.push()
     talk.wire.step(TICK_HZ)
     with pytest.raises(DeviceRefused):
-        talk.ask(Command.HIDE)
-    assert (talk.state, talk.cause) == (State.FAULT, Cause.LINK)
+        talk.ask(DeviceCommand.HIDE)
+    assert (talk.state, talk.cause) == (DeviceState.FAULT, DeviceCause.LINK)
     assert talk.number("FaultTick") - talk.number("HeardTick") == 501
     assert abs(talk.number("ZeroTick") - talk.number("FaultTick") - RELEASE_TICKS) <= 1
 
@@ -84,9 +93,9 @@ def test_a_control_loop_that_hangs_is_noticed_while_its_thread_lives() -> None:
     talk = Talk()
     talk.push()
     begun_s = talk.now_s()
-    while talk.state == State.RUNNING:
+    while talk.state == DeviceState.RUNNING:
         talk.wire.step(50)
-    assert talk.cause == Cause.HEARTBEAT
+    assert talk.cause == DeviceCause.HEARTBEAT
     assert talk.now_s() - begun_s == pytest.approx(1.0, abs=0.05)
 
 
@@ -95,7 +104,7 @@ def test_saying_hello_again_lets_go() -> None:
     talk.push()
     talk.hello()
     talk.wire.step(2 * RELEASE_TICKS)
-    assert (talk.state, talk.cause) == (State.FAULT, Cause.HOST)
+    assert (talk.state, talk.cause) == (DeviceState.FAULT, DeviceCause.HOST)
 
 
 def test_a_second_host_cannot_command_what_the_first_one_armed() -> None:
@@ -103,13 +112,13 @@ def test_a_second_host_cannot_command_what_the_first_one_armed() -> None:
     talk.push()
     other = Conversation(talk.wire, DEVICE)
     with pytest.raises(TransportLost):
-        other.write("Command", Command.SHOW)  # without the nonce
-    assert talk.number("Cause") == Cause.NONE
+        other.write("Command", DeviceCommand.SHOW)  # without the nonce
+    assert talk.number("Cause") == DeviceCause.NONE
     other.hello()
     with pytest.raises(TransportLost):
         talk.read("State")  # with numbers of before
     other.write("Heartbeat", 1)
-    assert other.read("Cause") == Cause.HOST
+    assert other.read("Cause") == DeviceCause.HOST
 
 
 def test_a_brown_out_in_the_middle_of_an_upload_leaves_no_model() -> None:
@@ -130,10 +139,10 @@ def test_a_brown_out_in_the_middle_of_an_upload_leaves_no_model() -> None:
         talk.upload(model.data, model.hash)
     talk.hello()
     assert talk.number("ModelHash") == 0
-    assert talk.state == State.IDLE
+    assert talk.state == DeviceState.IDLE
     with pytest.raises(DeviceRefused) as told:
-        talk.ask(Command.ARM)  # it has to be homed again
-    assert told.value.status == Status.STATE
+        talk.ask(DeviceCommand.ARM)  # it has to be homed again
+    assert told.value.status == DeviceStatus.STATE
     talk.upload(model.data, model.hash)
     assert talk.number("ModelHash") == model.hash
 
@@ -141,13 +150,13 @@ def test_a_brown_out_in_the_middle_of_an_upload_leaves_no_model() -> None:
 def test_a_device_that_was_restarted_is_not_armed_by_what_was_sent_before() -> None:
     talk = Talk()
     talk.push()
-    talk.spoil(Simulation.BROWN_OUT)
+    talk.spoil(DeviceSimulation.BROWN_OUT)
     talk.wire.step(2)
     for name in ("Tick", "State"):
         with pytest.raises(TransportLost):
             talk.read(name)
     talk.hello()
-    assert talk.state == State.IDLE
+    assert talk.state == DeviceState.IDLE
     assert talk.read("Current") == (0.0, 0.0)
 
 
@@ -173,14 +182,14 @@ def test_a_reader_that_stalls_loses_records_which_are_counted() -> None:
 @pytest.mark.parametrize(
     ("name", "value", "status"),
     [
-        ("Wall", (0.0, 1.7, 0.0, 100.0, 50.0), Status.RANGE),  # beyond StiffnessLimit
-        ("Wall", (0.0, 0.5, 0.0006, 100.0, 50.0), Status.RANGE),  # too damped to be passive
-        ("Workspace", (10.0, -10.0, -60.0, -5.0), Status.RANGE),
-        ("EventRate", 3000, Status.RANGE),  # divides no 5000
+        ("Wall", (0.0, 1.7, 0.0, 100.0, 50.0), DeviceStatus.RANGE),  # beyond StiffnessLimit
+        ("Wall", (0.0, 0.5, 0.0006, 100.0, 50.0), DeviceStatus.RANGE),  # too damped to be passive
+        ("Workspace", (10.0, -10.0, -60.0, -5.0), DeviceStatus.RANGE),
+        ("EventRate", 3000, DeviceStatus.RANGE),  # divides no 5000
     ],
 )
 def test_what_the_device_cannot_do_is_refused(
-    name: str, value: tuple[float, ...] | int, status: Status
+    name: str, value: tuple[float, ...] | int, status: DeviceStatus
 ) -> None:
     talk = Talk()
     before = talk.read(name)
@@ -196,16 +205,16 @@ def test_limits_stay_while_force_is_allowed() -> None:
     talk.push()
     with pytest.raises(DeviceRefused) as told:
         talk.write("ForceLimit", 20.0)
-    assert told.value.status == Status.STATE
+    assert told.value.status == DeviceStatus.STATE
     assert talk.read("ForceLimit") == 2.5
 
 
 def test_records_beyond_the_baud_rate_are_refused() -> None:
-    talk = Talk(Board(baud=115_200))
+    talk = Talk(VirtualBoard(baud=115_200))
     assert talk.write("EventRate", 200) == 200
     with pytest.raises(DeviceRefused) as told:
         talk.write("EventRate", 1000)
-    assert told.value.status == Status.RANGE
+    assert told.value.status == DeviceStatus.RANGE
 
 
 def test_a_register_that_there_is_not_is_refused() -> None:
@@ -214,7 +223,7 @@ def test_a_register_that_there_is_not_is_refused() -> None:
         talk.read("Colour")
     with pytest.raises(DeviceRefused) as told:
         talk.read("Command")
-    assert told.value.status == Status.ACCESS
+    assert told.value.status == DeviceStatus.ACCESS
 
 
 def test_the_hosts_samples_are_played_in_order_and_their_end_is_seen() -> None:
@@ -223,7 +232,7 @@ def test_the_hosts_samples_are_played_in_order_and_their_end_is_seen() -> None:
     for part in range(8):
         talk.write("Samples", tuple(float(x) for x in (ramp + part)[:25] / 10))
     assert talk.number("SamplesQueued") == 200
-    values = joined(talk.recorded(0.1, source=Source.HOST))
+    values = joined(talk.recorded(0.1, source=DeviceSource.HOST))
     played = values["vibration_g"]
     first = np.flatnonzero(played)[0]
     expected = np.concatenate([(ramp + part) / 10 for part in range(8)]).astype(np.float32)

@@ -10,7 +10,7 @@ import pytest
 from benches.rendering.rivals import layered_texture
 from modeling import InputError, Limits, Renderer, TextureModel
 from rig.device.models import DEVICE_LIMITS, device_model
-from rig.device.registers import Source, Status
+from rig.device.registers import DeviceSource, DeviceStatus
 from rig.wire.conversation import Block, DeviceRefused, Hello
 from stimuli.planted.textures import planted_texture
 from tests.refusals import refused
@@ -41,7 +41,7 @@ def test_the_device_renders_the_bits_of_the_host() -> None:
     talk.push()
     blocks = talk.recorded(0.02)
     talk.upload(upload.data, upload.hash)
-    talk.write("Source", Source.MODEL)
+    talk.write("Source", DeviceSource.MODEL)
     blocks += talk.blocks()
     for _ in range(600):
         talk.write("Heartbeat", 1)
@@ -61,7 +61,7 @@ def test_a_second_model_takes_over_through_silence() -> None:
     talk.push()
     first, second = (device_model(planted_texture(name), HELLO) for name in ("canvas", "MDF"))
     talk.upload(first.data, first.hash)
-    blocks = talk.recorded(0.3, source=Source.MODEL)
+    blocks = talk.recorded(0.3, source=DeviceSource.MODEL)
     talk.upload(second.data, second.hash)
     for _ in range(100):
         talk.write("Heartbeat", 1)
@@ -103,7 +103,7 @@ def test_what_is_no_model_is_refused_and_the_one_before_stays(spoilt) -> None:  
     other = type(good)(data, good.plan)
     with pytest.raises(DeviceRefused) as told:
         talk.upload(data, other.hash)
-    assert told.value.status == Status.MODEL
+    assert told.value.status == DeviceStatus.MODEL
     assert talk.number("ModelHash") == good.hash
 
 
@@ -112,7 +112,7 @@ def test_a_wrong_hash_is_refused() -> None:
     good = device_model(planted_texture("canvas"), HELLO)
     with pytest.raises(DeviceRefused) as told:
         talk.upload(good.data, good.hash ^ 1)
-    assert told.value.status == Status.MODEL
+    assert told.value.status == DeviceStatus.MODEL
     assert talk.number("ModelHash") == 0
 
 
@@ -126,4 +126,4 @@ def test_a_model_that_does_not_fit_is_refused_on_both_sides() -> None:
     talk = Talk()
     with pytest.raises(DeviceRefused) as told:
         talk.upload(bytes(16_385), 0)
-    assert told.value.status == Status.TOO_LARGE
+    assert told.value.status == DeviceStatus.TOO_LARGE

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from filelock import FileLock
 
-from rig.wire.envelope import Frame
+from rig.wire.envelope import WireFrame
 from tests.rig.device.compiled import ROOT, compiled_walks
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
@@ -83,5 +83,5 @@ def test_the_vectors_are_what_the_firmware_sends_and_takes(walks: Path) -> None:
     assert len(rows) > 90
     assert run.stdout.splitlines() == [f"{row['bytes']} 1" for row in rows]
     for row in rows:
-        frame = Frame(row["kind"], row["sequence"], row["nonce"], bytes.fromhex(row["body"]))
+        frame = WireFrame(row["kind"], row["sequence"], row["nonce"], bytes.fromhex(row["body"]))
         assert frame.encoded().hex() == row["bytes"]

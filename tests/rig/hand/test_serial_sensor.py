@@ -16,11 +16,12 @@ from modeling import InputError
 from rig.hand import serial_sensor
 from rig.hand.loop import HandLoop
 from rig.hand.reader import HandReader
-from rig.hand.sample import ConnectedDevice, DeviceLost
+from rig.hand.sample import DeviceLost
 from rig.hand.serial_line import SensorLine, encode
 from rig.hand.serial_sensor import SerialSensor
 from rig.hand.settings import HandSettings
 from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, Live
+from rig.wire import ports
 from tests.refusals import refused
 from tests.rig.hand.board import PERIOD_US, Board, at_constant_speed, stating
 from tests.rig.waiting import is_gone, wait_until
@@ -330,13 +331,13 @@ def test_a_board_that_sends_no_good_line_is_refused(
 def test_ports_that_cannot_be_opened_are_refused(
     tmp_path: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    port = ConnectedDevice("/dev/ttyX", "a board", "serial", readable=True)
-    monkeypatch.setattr(serial_sensor, "serial_ports", lambda: (port,))
+    monkeypatch.setattr(ports, "port_names", lambda: (("/dev/ttyX", "a board"),))
     with refused(InputError, expected="/dev/ttyNONE", got=["nothing", "/dev/ttyX", "a board"]):
         SerialSensor.open(HandSettings(kind="serial", device="/dev/ttyNONE"))
     with refused(InputError, expected="/dev/null", got="Could not configure port"):
         SerialSensor.open(HandSettings(kind="serial", device="/dev/null"))
-    monkeypatch.setattr(serial_sensor, "serial_ports", lambda: ())
+    monkeypatch.setattr(serial_sensor, "port_names", lambda: ())
+    monkeypatch.setattr(ports, "port_names", lambda: ())
     with refused(InputError, expected=["serial port", "[hand]"], got="none"):
         SerialSensor.open(HandSettings(kind="serial"))
 
@@ -354,14 +355,13 @@ def test_what_the_system_refuses_is_said_with_what_to_do(
     def refuse(*arguments: object, **options: object) -> None:
         raise raised
 
-    monkeypatch.setattr(serial_sensor.serial, "Serial", refuse)
+    monkeypatch.setattr(ports.serial, "Serial", refuse)
     with refused(InputError, names=board.path, expected=expected, got=got):
         SerialSensor.open(settings_of(board))
 
 
 def test_the_only_port_is_taken(board: Board, monkeypatch: pytest.MonkeyPatch, live: Live) -> None:
-    port = ConnectedDevice(board.path, "a board", "serial", readable=True)
-    monkeypatch.setattr(serial_sensor, "serial_ports", lambda: (port,))
+    monkeypatch.setattr(serial_sensor, "port_names", lambda: ((board.path, "a board"),))
     board.send(at_constant_speed)
     loop = HandLoop(live, HandSettings(kind="serial"), send=lambda told: None)
     assert loop.open() == f"serial sensor at {board.path}"

@@ -17,7 +17,7 @@ from modeling import InputError
 from rig.device.definition import DEVICE
 from rig.device.virtual import VirtualTransport
 from rig.wire.conversation import Conversation
-from rig.wire.envelope import REPLY, Frame, FrameReader
+from rig.wire.envelope import REPLY, WireFrame, WireReader
 from rig.wire.transports import SerialTransport, SocketTransport, TransportLost
 from tests.refusals import refused
 
@@ -99,12 +99,12 @@ def answering(answer: Callable[[bytes], bytes]) -> Iterator[str]:
 
 def hello_of(who: int, version: int, schema: int) -> Callable[[bytes], bytes]:
     """A device that says this of itself."""
-    reader = FrameReader()
+    reader = WireReader()
 
     def answer(data: bytes) -> bytes:
         body = b"\0" + struct.pack("<HHQfBI", who, version, schema, 5000.0, 8, 0)
         frames = list(reader.feed(data))
-        return b"".join(Frame(f.kind | REPLY, f.sequence, 5, body).encoded() for f in frames)
+        return b"".join(WireFrame(f.kind | REPLY, f.sequence, 5, body).encoded() for f in frames)
 
     return answer
 

@@ -17,7 +17,7 @@ from modeling import InputError
 from rig.device.definition import DEVICE
 from rig.device.emulating import Emulator
 from rig.device.models import device_model
-from rig.device.registers import Cause, Command, State
+from rig.device.registers import DeviceCause, DeviceCommand, DeviceState
 from rig.wire.link import Link
 from rig.wire.transports import Transport, opened_transport
 from stimuli.planted.textures import planted_texture
@@ -110,13 +110,13 @@ def until(met: Callable[[], bool], *, what: str) -> None:
 
 
 def running(link: Link) -> None:
-    for command in (Command.HOME, Command.ARM, Command.SHOW):
+    for command in (DeviceCommand.HOME, DeviceCommand.ARM, DeviceCommand.SHOW):
         link.write("Command", command)
-    assert link.read("State") == State.RUNNING
+    assert link.read("State") == DeviceState.RUNNING
 
 
 def during_arming(link: Link) -> None:
-    for command in (Command.HOME, Command.ARM):
+    for command in (DeviceCommand.HOME, DeviceCommand.ARM):
         link.write("Command", command)
 
 
@@ -159,8 +159,8 @@ def test_a_cable_that_is_pulled_is_a_fault_and_arms_nothing_when_it_is_back(
         time.sleep(0.2)
         cable.plug()
         until(lambda: link.connected, what="the link does not connect again")
-        assert link.read("State") == State.FAULT
-        assert link.read("Cause") in (Cause.LINK, Cause.HOST)
+        assert link.read("State") == DeviceState.FAULT
+        assert link.read("Cause") in (DeviceCause.LINK, DeviceCause.HOST)
         assert link.read("Current") == (0.0, 0.0)
         assert link.counts()["lost"] == 1
         assert len(link.faults()) == 1
@@ -197,9 +197,9 @@ def test_a_hanging_control_loop_is_noticed_while_the_links_thread_lives(cable: C
         for _ in range(10):
             link.beat()
             time.sleep(0.05)
-        assert link.read("State") == State.RUNNING
-        until(lambda: link.read("State") == State.FAULT, what="it is not noticed")
-        assert link.read("Cause") == Cause.HEARTBEAT
+        assert link.read("State") == DeviceState.RUNNING
+        until(lambda: link.read("State") == DeviceState.FAULT, what="it is not noticed")
+        assert link.read("Cause") == DeviceCause.HEARTBEAT
         late = int(link.read("FaultTick")) - int(link.read("HeardTick"))  # type: ignore[arg-type]
         assert late < 500  # the link itself was never silent
         assert link.counts()["lost"] == 0
