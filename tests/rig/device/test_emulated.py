@@ -43,6 +43,46 @@ def device(request: pytest.FixtureRequest) -> Iterator[Emulator]:
         yield emulator
 
 
+@pytest.mark.parametrize("device", ["process", "stm32"], indirect=True)
+def test_it_renders_the_bits_of_the_host(device: Emulator) -> None:
+    """In its own precision: of an STM32F405 single, against the kernel on this computer."""
+    model = planted_texture("canvas")
+    transport = opened_transport(device.address, BAUD)
+    try:
+        talk = Conversation(transport, DEVICE)
+        hello = talk.hello()
+        upload = device_model(model, hello)
+        for command in (DeviceCommand.HOME, DeviceCommand.ARM, DeviceCommand.SHOW):
+            talk.write("Command", command)
+        talk.write("EventRate", 5000 if hello.real_size == 4 else 1000)
+        talk.upload(upload.data, upload.hash)
+        talk.write("Source", DeviceSource.MODEL)
+        blocks, end_s = talk.blocks(), time.monotonic() + 1.6
+        while time.monotonic() < end_s:
+            talk.write("Heartbeat", 1)
+            talk.listen(0.02)
+            blocks += talk.blocks()
+        begin = talk.read("ModelTick")
+        talk.write("EventRate", 0)
+        talk.write("Source", DeviceSource.NOTHING)
+        talk.write("Command", DeviceCommand.STOP)
+        time.sleep(0.1)
+        talk.write("Command", DeviceCommand.CLEAR)
+    finally:
+        transport.close()
+    assert isinstance(begin, int)
+    every, values = blocks[0].every, joined(blocks)
+    host = hosts_samples(model, blocks, begin, single=hello.real_size == 4)
+    host = host[::every]
+    first = (begin - blocks[0].tick) // every
+    device_samples = values["vibration_g"][first:]
+    size = min(host.size, device_samples.size)
+    assert size > 300
+    assert np.abs(host[:size]).max() > 0.02
+    assert np.array_equal(device_samples[:size], host[:size].astype(np.float32))
+    print(f"\n{8 * hello.real_size} bits: {size} samples, all equal")
+
+
 def test_a_client_written_from_the_page_alone_talks_to_it(device: Emulator) -> None:
     client = Client(device.address)
     try:
@@ -63,47 +103,6 @@ def test_a_client_written_from_the_page_alone_talks_to_it(device: Emulator) -> N
         client.write(10, bytes([4]))
     finally:
         client.close()
-
-
-@pytest.mark.parametrize("device", ["process", "stm32"], indirect=True)
-def test_it_renders_the_bits_of_the_host(device: Emulator) -> None:
-    """In its own precision: of an STM32F405 single, against the kernel on this computer."""
-    model = planted_texture("canvas")
-    transport = opened_transport(device.address, BAUD)
-    try:
-        talk = Conversation(transport, DEVICE)
-        hello = talk.hello()
-        upload = device_model(model, hello)
-        if talk.read("State") == DeviceState.FAULT:
-            talk.write("Command", DeviceCommand.CLEAR)
-            time.sleep(0.1)
-        for command in (DeviceCommand.HOME, DeviceCommand.ARM, DeviceCommand.SHOW):
-            talk.write("Command", command)
-        talk.write("EventRate", 5000 if hello.real_size == 4 else 1000)
-        talk.upload(upload.data, upload.hash)
-        talk.write("Source", DeviceSource.MODEL)
-        blocks, end_s = talk.blocks(), time.monotonic() + 1.6
-        while time.monotonic() < end_s:
-            talk.write("Heartbeat", 1)
-            talk.listen(0.02)
-            blocks += talk.blocks()
-        begin = talk.read("ModelTick")
-        talk.write("EventRate", 0)
-        talk.write("Source", DeviceSource.NOTHING)
-        talk.write("Command", DeviceCommand.STOP)
-    finally:
-        transport.close()
-    assert isinstance(begin, int)
-    every, values = blocks[0].every, joined(blocks)
-    host = hosts_samples(model, blocks, begin, single=hello.real_size == 4)
-    host = host[::every]
-    first = (begin - blocks[0].tick) // every
-    device_samples = values["vibration_g"][first:]
-    size = min(host.size, device_samples.size)
-    assert size > 300
-    assert np.abs(host[:size]).max() > 0.02
-    assert np.array_equal(device_samples[:size], host[:size].astype(np.float32))
-    print(f"\n{8 * hello.real_size} bits: {size} samples, all equal")
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
