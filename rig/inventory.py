@@ -24,7 +24,7 @@ from rig.force.wall import largest_stiffness_n_per_mm
 from rig.hand.devices import connected_devices
 from rig.hand.sample import ConnectedDevice
 from rig.live.memory import compiled
-from rig.setup.force_sections import ForceSection
+from rig.setup.force_sections import DeviceSection, ForceSection
 from rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
 from rig.sound.devices import (
     Direction,
@@ -204,6 +204,8 @@ def _force(rig: RigFile, force: ForceSection) -> list[Finding]:
     if force.damping.assumed or force.delay_ms.assumed:
         stable += ", on assumed damping or delay"
     found = [Finding("wall", f"{stable}; force is commanded, not sensed", "note")]
+    if rig.own_device is not None:
+        return [_device(rig.own_device), *found]
     if rig.pose is None:
         sentence = "expected a measured pose, got none; measure it (tactileq rig pose)."
         found.append(Finding("pose", sentence, "note"))
@@ -215,6 +217,24 @@ def _force(rig: RigFile, force: ForceSection) -> list[Finding]:
     version = ".".join(map(str, library.version[:2]))
     tested = "simulated" if library.simulated else UNTESTED
     return [Finding("force device", f"libdhd {version}: {tested}", "note"), *found]
+
+
+def _device(section: DeviceSection) -> Finding:
+    """What the device says of itself; saying hello lets go what another program had armed."""
+    try:
+        from rig.device.asking import asked  # needs the extra rig
+
+        found = asked(section.address, section.baud)
+    except InputError as error:
+        return Finding("force device", str(error), "fault")
+    if found.simulated and not section.simulated:
+        sentence = (
+            "expected a board with a hand at [device], got an emulated one; set "
+            "device.simulated = true, so that data say so."
+        )
+        return Finding("force device", sentence, "fault")
+    tested = "simulated" if found.simulated else UNTESTED
+    return Finding("force device", f"{found.name}, {found.state}: {tested}", "note")
 
 
 def _hand(rig: RigFile) -> Finding:

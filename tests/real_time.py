@@ -19,9 +19,8 @@ from rig.monitoring.bare_thread import Look, WakeUps
 REPEATS = 2
 PERIOD_S = 128 / 48000  # a block of the audio server, which is as short of time
 ANSWER_S = 60.0
-LIVE = tuple(
-    f"tests/rig/{room}/" for room in ("hand", "live", "monitoring", "capture", "desk", "force")
-)
+ROOMS = ("hand", "live", "monitoring", "capture", "desk", "force", "wire", "device")
+LIVE = tuple(f"tests/rig/{room}/" for room in ROOMS)
 
 
 class BareProcess:

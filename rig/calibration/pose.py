@@ -35,6 +35,11 @@ def touching_hand(rig: RigFile, live: Live) -> ForceHand:
         For a rig without one.
     """
     settings = force_settings(rig, sounds=False)
+    if rig.own_device is not None:
+        raise InputError(
+            f"expected a force device with a frame of its own, got [device] in {rig.path}, whose "
+            "wall lies where its firmware says; measure the surface by hand."
+        )
     if settings is None:
         raise InputError(
             f'expected a force device, got hand.kind = "{rig.hand.kind}" in {rig.path}; nothing '

@@ -80,13 +80,16 @@ def force_settings(rig: RigFile, *, sounds: bool = True) -> ForceSettings | None
     sounds : bool
         Whether the rig also plays: then a wall is released where the sound ends.
     """
-    force, pose = rig.force_device, rig.pose
+    force, pose, device = rig.force_device, rig.pose, rig.own_device
     if force is None:
         return None
     period_s = rig.sound.block / rig.sound.rate_hz
     return ForceSettings(
         library=force.library,
         serial=force.serial,
+        address="" if device is None else device.address,
+        baud=1_000_000 if device is None else device.baud,
+        watched=device is None,  # it watches itself
         rate_hz=force.rate_hz,
         delay_s=rig.hand.filter_delay_s.value,
         contact_n=rig.hand.contact_n.value,

@@ -13,6 +13,7 @@ from rig.setup.rig_file import RigFile
 
 MARGIN = 0.5  # of the largest stiffness, where nothing says which
 USUAL_MM = 100.0
+DEVICE_WALL_MM = -50.0  # height of the wall's frame in that of a device that renders by itself
 Millimetres = tuple[float, float, float]
 
 
@@ -140,6 +141,8 @@ def _floored(value: float) -> float:
 def in_device(rig: RigFile, point_mm: Millimetres) -> Millimetres:
     """A point of the wall's frame in the frame of the device."""
     pose = rig.pose
+    if rig.own_device is not None:
+        return point_mm[0], point_mm[1], point_mm[2] + DEVICE_WALL_MM
     if pose is None:
         return point_mm
     x, y, z = (

@@ -236,11 +236,11 @@ static inline void tq_device_mind(tq_device *d)
     if (d->force.state != TQ_ARMED && d->force.state != TQ_RUNNING)
         return;
     if (now - d->heard > TQ_LINK_TICKS)
-        tq_force_event(&d->force, TQ_FAILED, TQD_CAUSE_LINK);
+        tq_force_event(&d->force, TQ_FAILED, TQ_LINK_LOST);
     else if (now - d->beat > TQ_BEAT_TICKS)
-        tq_force_event(&d->force, TQ_FAILED, TQD_CAUSE_HEARTBEAT);
+        tq_force_event(&d->force, TQ_FAILED, TQ_HEARTBEAT_LOST);
     else if (d->failing)
-        tq_force_event(&d->force, TQ_FAILED, TQD_CAUSE_NOT_WRITTEN);
+        tq_force_event(&d->force, TQ_FAILED, TQ_NOT_WRITTEN);
 }
 
 /* Currents for the force that was decided; none in a state without force. */
@@ -427,7 +427,7 @@ static inline void tq_device_tick(tq_device *d, const uint16_t counts[TQ_MOTORS]
     tq_device_mind(d);
     tq_force_tick(&d->force, &sensed, (tq_number)ticks / TQ_TICK_HZ);
     if (tq_device_stuck(d) && (d->force.state == TQ_ARMED || d->force.state == TQ_RUNNING))
-        tq_force_event(&d->force, TQ_FAILED, TQD_CAUSE_STUCK); /* unless it jumped */
+        tq_force_event(&d->force, TQ_FAILED, TQ_STUCK); /* unless it jumped */
     tq_device_pull(d);
     v->position[0] = (float)sensed.position_mm[0], v->position[1] = (float)sensed.position_mm[2];
     v->depth = (float)d->force.depth_mm, v->button = (uint8_t)button;
@@ -536,7 +536,7 @@ static inline int tq_device_command(tq_device *d, int command)
         tq_force_event(f, TQ_CLEAR, 0);
         return TQD_STATUS_OK;
     case TQD_COMMAND_STOP:
-        tq_force_event(f, TQ_FAILED, TQD_CAUSE_STOPPED);
+        tq_force_event(f, TQ_FAILED, TQ_STOPPED);
         return TQD_STATUS_OK;
     case TQD_COMMAND_HOME:
         if (!idle)
@@ -635,6 +635,7 @@ static inline int tq_device_apply(tq_device *d, const tqd_register *r, const uin
 static inline void tq_device_look(tq_device *d, const tqd_register *r, uint8_t *value)
 {
     tqd_values *v = &d->values;
+    v->homed = (uint8_t)d->homed, v->simulated = (uint8_t)d->board.simulated;
     if (r->address == TQD_SAMPLES_QUEUED)
         v->samples_queued = (uint16_t)(d->samples_in - d->samples_out);
     if (r->address == TQD_FRAMES_BAD)
@@ -787,7 +788,7 @@ static inline void tq_device_greet(tq_device *d, const tq_frame *f)
     }
     d->board.lock(d->board.context);
     if (d->force.state == TQ_ARMED || d->force.state == TQ_RUNNING)
-        tq_force_event(&d->force, TQ_FAILED, TQD_CAUSE_HOST);
+        tq_force_event(&d->force, TQ_FAILED, TQ_HOST_CHANGED);
     if (!d->greeted) /* the moment of the first hello is not foreseen, either */
         d->nonce = (uint32_t)tq_scene_mix((uint64_t)d->board.entropy << 32 | v->tick) | 1;
     d->greeted = 1, d->heard = d->beat = v->tick;

@@ -10,7 +10,7 @@
 
 #include <string.h>
 
-enum { TQ_CAPACITY = 2048, TQ_MOST_LAYERS = 8, TQ_MODEL_HEADER = 24, TQ_MODEL_SCALARS = 10 };
+enum { TQ_CAPACITY = 2048, TQ_MOST_LAYERS = 8, TQ_MODEL_HEADER = 24, TQ_MODEL_SCALARS = 13 };
 #define TQ_LARGEST_GAIN 1000 /* g */
 #define TQ_LARGEST_PEAK 20   /* g */
 #define TQ_LARGEST_VALUE 1000000
@@ -83,6 +83,7 @@ static inline int tq_model_of(tq_upload *upload, size_t size, tq_real rate_hz, t
     t->rate_hz = t->model_rate_hz = r[0];
     t->speed_change = r[1], t->force_change = r[2], t->slope_share = r[3], t->hold = r[4], t->release = r[5];
     t->peak = r[6], t->mean_square = r[7], t->mean_share = r[8], t->silence = r[9];
+    t->notch_hz = r[10], t->notch_width_hz = r[11], t->notch_share = r[12];
     t->update_samples = (int)update, t->longest = longest, t->pause = pause;
     t->speed_mm_s = r + TQ_MODEL_SCALARS, t->force_n = t->speed_mm_s + t->speeds;
     t->signs = t->force_n + t->forces, t->slews = t->signs + layers, t->values = t->slews + 1 + layers;
@@ -90,6 +91,7 @@ static inline int tq_model_of(tq_upload *upload, size_t size, tq_real rate_hz, t
            && tq_all_within(r + 1, 5, 0, TQ_LARGEST_VALUE) && r[3] > 0 && r[3] <= 1
            && r[6] > 0 && r[6] <= TQ_LARGEST_PEAK && r[7] > 0 && r[7] <= TQ_LARGEST_PEAK * TQ_LARGEST_PEAK
            && r[8] > 0 && r[8] <= 1 && r[9] > 0 && r[9] <= 1
+           && r[12] >= 0 && r[12] < 1 && (r[12] == 0 || (tq_all_within(r + 10, 2, 1, rate_hz / 2 * (tq_real)0.9)))
            && tq_rises(t->speed_mm_s, t->speeds) && tq_rises(t->force_n, t->forces)
            && t->speed_mm_s[t->speeds - 1] <= TQ_LARGEST_VALUE && t->force_n[t->forces - 1] <= TQ_LARGEST_VALUE
            && tq_all_within(t->signs, layers, -1, 1) && tq_all_within(t->slews, layers + 1, 0, TQ_LARGEST_GAIN)

@@ -9,7 +9,7 @@ import numpy as np
 
 from modeling.errors import InputError
 from modeling.rendering.limits import Limits
-from modeling.rendering.plan import LayeredModel, RenderPlan, plan_for
+from modeling.rendering.plan import LayeredModel, Notch, RenderPlan, plan_for
 from rig.wire.conversation import Hello
 
 MOST_LAYERS = 8
@@ -28,6 +28,9 @@ _SCALARS = (
     "mean_square",
     "mean_share",
     "silence",
+    "notch_hz",
+    "notch_width_hz",
+    "notch_share",
 )
 _ARRAYS = ("speed_mm_s", "force_n", "signs", "slews", "values")
 _LONGEST = 2**32 - 1
@@ -56,7 +59,11 @@ class DeviceModel:
 
 
 def device_model(
-    model: LayeredModel, hello: Hello, *, limits: Limits = DEVICE_LIMITS
+    model: LayeredModel,
+    hello: Hello,
+    *,
+    limits: Limits = DEVICE_LIMITS,
+    compensation: Notch | None = None,
 ) -> DeviceModel:
     """A model for a device that said this of itself.
 
@@ -66,6 +73,8 @@ def device_model(
         At the device's rate, with at most 8 layers.
     limits : Limits
         All of them finite.
+    compensation : Compensation, optional
+        Of the vibrator's resonance (eq. 7), at the device's rate.
 
     Raises
     ------
@@ -83,14 +92,19 @@ def device_model(
             "expected finite limits of peak, RMS and duration for a device, got an infinite one; "
             "give all three."
         )
-    plan = plan_for(model.rate_hz, limits=limits, single=hello.real_size == 4)
+    plan = plan_for(
+        model.rate_hz,
+        limits=limits,
+        compensation=compensation,
+        single=hello.real_size == 4,
+    )
     fields = plan.texture(model)
     if fields["layers"] > MOST_LAYERS:
         raise InputError(
             f"expected at most {MOST_LAYERS} layers for the device, got {fields['layers']}; "
             "simplify the model (tactileq simplify)."
         )
-    reals = [np.asarray([fields[name] for name in _SCALARS])]
+    reals = [np.asarray([fields.get(name, 0.0) for name in _SCALARS])]
     reals += [np.ravel(fields[name]) for name in _ARRAYS]
     count = sum(part.size for part in reals) + _HEAD.size // hello.real_size
     if count > CAPACITY_REALS:

@@ -10,7 +10,7 @@
 
 #define TQD_WHO_AM_I_VALUE 29012
 #define TQD_FIRMWARE_VERSION_VALUE 256
-#define TQD_SCHEMA_HASH_VALUE UINT64_C(0x95017eb5b441be0d)
+#define TQD_SCHEMA_HASH_VALUE UINT64_C(0x457ca80cf373bd8f)
 
 /* Addresses. */
 enum {
@@ -67,6 +67,8 @@ enum {
     TQD_TICK_CLOCKS = 61,
     TQD_SIMULATE = 64,
     TQD_STROKE = 65,
+    TQD_SIMULATED = 66,
+    TQD_HOMED = 67,
 };
 
 /* States of rig/force/force.h; there is force in ARMED (a wall ramps out), RUNNING and RELEASING only. */
@@ -212,6 +214,8 @@ typedef struct {
     uint8_t button;
     uint8_t shutdown_error;
     uint8_t simulate;
+    uint8_t simulated;
+    uint8_t homed;
 } tqd_values;
 
 enum { TQD_INTEGER, TQD_FLOAT };
@@ -311,8 +315,10 @@ static const tqd_register tqd_registers[] = {
     { TQD_TICK_CLOCKS, TQD_INTEGER, 4, 2, TQD_READS, 0, 0, offsetof(tqd_values, tick_clocks) },
     { TQD_SIMULATE, TQD_INTEGER, 1, 1, TQD_WRITES, 21, 0, offsetof(tqd_values, simulate) },
     { TQD_STROKE, TQD_FLOAT, 4, 3, TQD_READS | TQD_WRITES, 22, 1, offsetof(tqd_values, stroke) },
+    { TQD_SIMULATED, TQD_INTEGER, 1, 1, TQD_READS, 0, 0, offsetof(tqd_values, simulated) },
+    { TQD_HOMED, TQD_INTEGER, 1, 1, TQD_READS, 0, 0, offsetof(tqd_values, homed) },
 };
 
-enum { TQD_REGISTERS = 53 };
+enum { TQD_REGISTERS = 55 };
 
 #endif

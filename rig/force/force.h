@@ -21,6 +21,7 @@ enum {
     TQ_NO_CAUSE, TQ_NOT_READ, TQ_NOT_A_NUMBER, TQ_LATE, TQ_JUMP, TQ_SPEED, TQ_WORKSPACE, TQ_FROZEN,
     TQ_HEARTBEAT_LOST, TQ_SOUND_LOST, TQ_WATCHDOG_LOST, TQ_NOT_WRITTEN, TQ_STOPPED,
     TQ_STOOD_STILL, /* by the watchdog: the servo itself */
+    TQ_LINK_LOST, TQ_HOST_CHANGED, TQ_STUCK, /* by a device that renders by itself */
     TQ_CAUSES
 };
 

@@ -150,7 +150,8 @@ class ForceHand(HandReader):
 
     def _start(self, *, patient: bool) -> Child:
         settings = RunServo(live=str(self._live.path), settings=self._force, patient=patient)
-        self._child = child = Child("rig.force.process", settings)
+        process = "rig.device.servo" if self._force.address else "rig.force.process"
+        self._child = child = Child(process, settings)
         if self._watchdog is not None:
             with suppress(ChildLost):
                 self._watchdog.send(Servo(child.pid))

@@ -33,6 +33,8 @@ class ForceSettings:
         Path of libdhd, or "stand-in"; None looks for it where libraries are.
     serial : int, optional
         Which of several devices.
+    address : str
+        Port or socket of a device that renders by itself; empty for the maker's library.
     delay_s : float
         Of the tracking filter, which gives the speed of strokes.
     sound_s : float
@@ -43,6 +45,8 @@ class ForceSettings:
 
     library: str | None = None
     serial: int | None = None
+    address: str = ""
+    baud: int = 1_000_000
     rate_hz: float = 1000.0
     delay_s: float = 0.01
     contact_n: float = 0.05

@@ -46,6 +46,9 @@ class Cause(IntEnum):
     NOT_WRITTEN = 11
     STOPPED = 12
     STOOD_STILL = 13
+    LINK = 14
+    HOST = 15
+    STUCK = 16
 
 
 class Ask(IntEnum):
@@ -81,6 +84,12 @@ SENTENCES = {
     "cable and power.",
     Cause.STOOD_STILL: "expected the servo of the force device to tick, got none for 20 ms; "
     "close other programs.",
+    Cause.LINK: "expected the device to hear from this computer every 0.1 s, got silence; check "
+    "its cable, and close other programs.",
+    Cause.HOST: "expected one program to command the device, got another one that said hello; end "
+    "it.",
+    Cause.STUCK: "expected both encoders of the device to move, got one that stands still; check "
+    "its cable.",
     Cause.STOPPED: "the force device was stopped.",
 }
 

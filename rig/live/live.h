@@ -223,6 +223,12 @@ static inline void tq_heartbeat(tq_live *live, double time_s)
     tq_put_time(&live->heartbeat, time_s);
 }
 
+/* When that was. */
+static inline double tq_heartbeat_s(const tq_live *live)
+{
+    return tq_take_time(&live->heartbeat);
+}
+
 static inline void tq_write_reading(tq_live *live, double time_s, double x_mm, double y_mm,
                                     double depth_mm, double speed_mm_s, double force_n, uint32_t flags)
 {

@@ -110,6 +110,21 @@ class ForceSection(FileSection):
 
 
 @dataclass(frozen=True, kw_only=True)
+class DeviceSection(FileSection):
+    """A [device that renders by itself](device.md) as the hand of kind "force".
+
+    [force] holds its limits.
+    """
+
+    WHERE: ClassVar[str] = "[device]"
+    address: Annotated[Name, key("path of its serial port, or socket://HOST:PORT")]
+    baud: Annotated[int, key("of its port", unit="baud", ge=9600, le=4_000_000)] = 1_000_000
+    simulated: Annotated[
+        bool, key("whether it is emulated (tactileq rig device --emulate); refused where it lies")
+    ] = False
+
+
+@dataclass(frozen=True, kw_only=True)
 class PoseSection(FileSection):
     """Where the frame of the wall lies in the device's; `tactileq rig pose` writes it."""
 

@@ -27,7 +27,7 @@ from modeling.vibrators.exposure import ACTION_VALUE_M_S2
 from modeling.vibrators.vibrator import Vibrator
 from rig.setup.editing import with_values
 from rig.setup.figures import Curve, Figure
-from rig.setup.force_sections import ForceSection, PoseSection
+from rig.setup.force_sections import DeviceSection, ForceSection, PoseSection
 from rig.setup.sections import (
     AccelerometerSection,
     CalibrationSection,
@@ -40,6 +40,7 @@ from rig.setup.sections import (
     VibratorSection,
 )
 
+DEVICE_RATE_HZ = 5000.0  # of the control loop of [device]
 SHIPPED_RIG_FILE = Path(__file__).with_name("desk_rig.toml")
 
 
@@ -49,7 +50,7 @@ class RigFile(DescribedFile):
 
     Parameters
     ----------
-    rig, sound, vibrator, limits, hand, force, pose, accelerometer, latency, calibration
+    rig, sound, vibrator, limits, hand, force, device, pose, accelerometer, latency, calibration
         Its sections (`rig.setup.sections`, `rig.setup.force_sections`). None where there is no
         force device or accelerometer, and where pose, latency or calibration have not been
         measured yet.
@@ -68,6 +69,7 @@ class RigFile(DescribedFile):
     limits: LimitsSection = field(default=LimitsSection())
     hand: HandSection
     force: ForceSection | None = None
+    device: DeviceSection | None = None
     pose: PoseSection | None = None
     accelerometer: AccelerometerSection | None = None
     latency: LatencySection | None = None
@@ -83,11 +85,32 @@ class RigFile(DescribedFile):
                 'expected [force] for hand.kind = "force", got none; describe the device there, or '
                 "take another hand."
             )
+        self._check_device()
         homed = None if self.force is None else self.force.homed_on
         if self.pose is not None and homed is not None and self.pose.measured_on < homed:
             raise InputError(
                 f"expected a pose that was measured since the force device was homed on {homed}, "
                 f"got one of {self.pose.measured_on}; measure it again (tactileq rig pose)."
+            )
+
+    def _check_device(self) -> None:
+        force = self.force_device
+        if self.own_device is None or force is None:
+            return
+        given = [
+            name
+            for name, value in (("force.library", force.library), ("[pose]", self.pose))
+            if value is not None
+        ]
+        if given:
+            raise InputError(
+                f"expected neither force.library nor [pose] beside [device], got {given[0]}; the "
+                "device has its own geometry (docs/device.md): remove one of them."
+            )
+        if force.rate_hz != DEVICE_RATE_HZ:
+            raise InputError(
+                f"expected force.rate_hz = {DEVICE_RATE_HZ:g} beside [device], got "
+                f"{force.rate_hz:g}; its control loop has no other rate."
             )
 
     @classmethod
@@ -196,6 +219,11 @@ class RigFile(DescribedFile):
         return self.force if self.hand.kind == "force" else None
 
     @property
+    def own_device(self) -> DeviceSection | None:
+        """[device] where the hand is of kind "force"; None of any other rig."""
+        return self.device if self.hand.kind == "force" else None
+
+    @property
     def highest_exposure_m_s2(self) -> float:
         """Up to which daily exposure A(8) a participant may be stimulated."""
         given = self.limits.exposure_m_s2
@@ -206,6 +234,7 @@ class RigFile(DescribedFile):
         """Whether no person feels anything here: a scripted hand, or a card that is none."""
         device = self.force_device
         stands_in = device is not None and device.simulated
+        stands_in |= self.own_device is not None and self.own_device.simulated
         return self.hand.kind == "scripted" or self.sound.simulated or stands_in
 
 

@@ -4,17 +4,11 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
 from tactileq.interruption import Interrupted
-
-if TYPE_CHECKING:
-    from rig.wire.conversation import Hello
-    from rig.wire.definition import Value
-
-_SHOWN = ("State", "Cause", "Tick", "EventRate", "ModelHash", "FramesBad", "RecordsLost")
 
 
 def rig_device(
@@ -94,32 +88,10 @@ def _write_firmware(kind: Literal["process", "m7", "stm32"], file: Path, baud: i
 
 
 def _ask(address: str, baud: int) -> None:
-    from rig.device.definition import DEVICE
-    from rig.wire.conversation import Conversation
-    from rig.wire.transports import TransportLost, opened_transport
+    from rig.device.asking import ASKED, asked
 
-    transport = opened_transport(address, baud)
-    try:
-        talk = Conversation(transport, DEVICE)
-        hello = talk.hello()
-        values = {name: talk.read(name) for name in _SHOWN}
-    except TransportLost as lost:
-        raise ValueError(f"expected a device that stays, got an end: {lost}") from None
-    finally:
-        transport.close()
-    _print(address, hello, values)
-
-
-def _print(address: str, hello: Hello, values: dict[str, Value]) -> None:
-    from rig.device.registers import DeviceCause, DeviceState
-
-    major, minor = hello.firmware_version
-    precision = "double" if hello.real_size == 8 else "single"
-    print(
-        f"{address}: device {hello.who_am_i}, firmware {major}.{minor}, schema "
-        f"{hello.schema_hash:016x}, {hello.tick_rate_hz:g} Hz, {precision} precision"
-    )
-    state, cause = DeviceState(int(values["State"])), DeviceCause(int(values["Cause"]))  # type: ignore[arg-type]
-    print(f"state {state.name}, last cause {cause.name}")
-    for name in _SHOWN[2:]:
-        print(f"{name} {values[name]}")
+    found = asked(address, baud)
+    print(f"{address}: {found.name}{', simulated' if found.simulated else ''}")
+    print(found.state)
+    for name in ASKED[3:]:
+        print(f"{name} {found.values[name]}")

@@ -24,8 +24,11 @@ with Link(lambda: opened_transport(sys.argv[1], 1_000_000), DEVICE) as link:
         time.sleep(0.05)
     for command in (6, 1, 2):
         link.write("Command", command)
+    begun_s = time.monotonic()
     while link.read("Force") < 0.2:
         link.beat()
+        if time.monotonic() > begun_s + 5:
+            sys.exit(f"no force: cause {link.read('Cause')}")
     print("pushes", flush=True)
     while True:
         link.beat()

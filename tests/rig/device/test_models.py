@@ -9,6 +9,7 @@ import pytest
 
 from benches.rendering.rivals import layered_texture
 from modeling import InputError, Limits, Renderer, TextureModel
+from modeling.vibrators.compensation import Compensation
 from rig.device.models import DEVICE_LIMITS, device_model
 from rig.device.registers import DeviceSource, DeviceStatus
 from rig.wire.conversation import Block, DeviceRefused, Hello
@@ -21,10 +22,15 @@ HELLO = Hello(29012, (1, 0), 0, 5000.0, 8, 0)
 
 
 def hosts_samples(
-    model: TextureModel, blocks: list[Block], begin_tick: int, *, single: bool, stream: int = 0
+    model: TextureModel,
+    blocks: list[Block],
+    begin_tick: int,
+    *,
+    single: bool,
+    compensation: Compensation | None = None,
 ) -> np.ndarray:
     """What the host renders from the same readings, from a model's first sample on."""
-    renderer = Renderer(model, limits=DEVICE_LIMITS, stream=stream, single=single)
+    renderer = Renderer(model, limits=DEVICE_LIMITS, compensation=compensation, single=single)
     values, tick, every = joined(blocks), blocks[0].tick, blocks[0].every
     assert tick <= begin_tick
     samples = []
@@ -34,10 +40,14 @@ def hosts_samples(
     return np.concatenate(samples)
 
 
-def test_the_device_renders_the_bits_of_the_host() -> None:
+NOTCH = Compensation(rate_hz=5000.0, frequency_hz=240.0, bandwidth_hz=90.0, height=3.0)
+
+
+@pytest.mark.parametrize("compensation", [None, NOTCH], ids=["plain", "compensated"])
+def test_the_device_renders_the_bits_of_the_host(compensation: Compensation | None) -> None:
     """In double precision: through strokes, turns, and contact that begins and ends."""
     talk, model = Talk(), planted_texture("canvas")
-    upload = device_model(model, HELLO)
+    upload = device_model(model, HELLO, compensation=compensation)
     talk.push()
     blocks = talk.recorded(0.02)
     talk.upload(upload.data, upload.hash)
@@ -48,7 +58,7 @@ def test_the_device_renders_the_bits_of_the_host() -> None:
         talk.listen(0.004)
         blocks += talk.blocks()
     begin = talk.number("ModelTick")
-    host = hosts_samples(model, blocks, begin, single=False)
+    host = hosts_samples(model, blocks, begin, single=False, compensation=compensation)
     device = joined(blocks)["vibration_g"][begin - blocks[0].tick :]
     size = min(host.size, device.size)
     assert size > 5000
@@ -88,7 +98,7 @@ def test_a_second_model_takes_over_through_silence() -> None:
         lambda data: data[:24] + struct.pack("<d", 4000.0) + data[32:],
         lambda data: data[:72] + struct.pack("<d", float("inf")) + data[80:],  # no peak
         lambda data: (
-            data[:104] + struct.pack("<d", -1.0) + data[112:]
+            data[:128] + struct.pack("<d", -1.0) + data[136:]
         ),  # an axis that does not rise
         lambda data: data[:-8] + struct.pack("<d", float("nan")),
         lambda data: data[:-8] + struct.pack("<d", 1e9),
