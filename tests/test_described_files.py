@@ -170,6 +170,7 @@ RIG = Kind(
                 "high_mm": [50, 60, 70],
                 "homed_on": DAY,
             },
+            "device": {"address": "/dev/ttyACM0", "baud": 500_000, "simulated": True},
             "pose": {
                 "origin_mm": [1.5, 0, -2],
                 "x": [0, 1, 0],
