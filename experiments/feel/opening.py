@@ -73,7 +73,8 @@ def notes_on(rig: RigFile) -> tuple[str, ...]:
     late = rig.latency is not None and rig.latency.p95_ms.value > HIGHEST_LATENCY_MS
     notes = {
         "simulated hand": rig.hand.kind == "scripted",
-        "simulated force device": rig.force_device is not None and rig.force_device.simulated,
+        "simulated force device": (rig.force_device is not None and rig.force_device.simulated)
+        or (rig.own_device is not None and rig.own_device.simulated),
         "force commanded, not sensed": rig.force_device is not None,
         "simulated sound card": rig.sound.simulated,
         "force assumed": not rig.hand.measures_force,

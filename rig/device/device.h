@@ -74,6 +74,7 @@ typedef struct {
     /* Currents and what they heat. */
     tq_number current_a[TQ_MOTORS], heat_a2_s[TQ_MOTORS];
     int clipped, failing, releasing;
+    int noted; /* the state at the end of the last tick; commands come in between */
     /* The vibration. */
     tq_upload uploads[2];
     tq_texture textures[2];
@@ -125,7 +126,7 @@ static inline void tq_device_defaults(tq_device *d)
     v->current_limit = 6, v->heat_limit = 20, v->vibration_limit = 5;
     v->tension_range[0] = 0.2f, v->tension_range[1] = 16;
     v->contact_force = 0.05f;
-    v->stroke[0] = 60, v->stroke[1] = 0.5f, v->stroke[2] = 4;
+    v->stroke[0] = 40, v->stroke[1] = 0.5f, v->stroke[2] = 4;
 }
 
 /* The limits of the law, from the registers. */
@@ -286,9 +287,10 @@ static inline void tq_device_pull(tq_device *d)
 }
 
 /* Notes when it let go, and when nothing pulled any more; shuts every output then. */
-static inline void tq_device_note(tq_device *d, int before)
+static inline void tq_device_note(tq_device *d)
 {
-    int state = d->force.state;
+    int state = d->force.state, before = d->noted;
+    d->noted = state;
     if ((before == TQ_ARMED || before == TQ_RUNNING) && (state == TQ_RELEASING || state == TQ_FAULT)) {
         d->values.fault_tick = d->values.tick;
         d->values.heard_tick = d->heard;
@@ -421,7 +423,6 @@ static inline void tq_device_tick(tq_device *d, const uint16_t counts[TQ_MOTORS]
 {
     tq_sensed sensed;
     tqd_values *v = &d->values;
-    int before = d->force.state;
     tq_device_count(d, counts);
     tq_device_sense(d, button, &sensed);
     tq_device_mind(d);
@@ -435,7 +436,7 @@ static inline void tq_device_tick(tq_device *d, const uint16_t counts[TQ_MOTORS]
     d->read_tick = v->tick / TQ_READ_TICKS;
     v->state = (uint8_t)d->force.state, v->cause = (uint8_t)d->force.cause;
     tq_device_act(d);
-    tq_device_note(d, before);
+    tq_device_note(d);
     tq_device_record(d, button);
     v->tick += (uint32_t)ticks;
 }
@@ -722,7 +723,7 @@ static inline int tq_device_data(tq_device *d, const tq_frame *f)
     if (d->slot < 0)
         return TQD_STATUS_STATE;
     if (at != d->upload_count)
-        return TQD_STATUS_SEQUENCE;
+        return TQD_STATUS_RANGE;
     if (count > d->upload_bytes - d->upload_count)
         return TQD_STATUS_TOO_LARGE;
     memcpy(d->uploads[d->slot].bytes + at, f->body + 5, count);

@@ -8,7 +8,7 @@
 
 #include "device.h"
 
-/* The hand: its mass, stiffness and damping; it strokes while force is allowed and else rests. */
+/* The hand: its mass, stiffness and damping; it strokes while a wall is shown and else rests. */
 #define TQ_HAND_KG ((tq_number)0.15)
 #define TQ_HAND_N_PER_MM ((tq_number)0.3)
 #define TQ_HAND_N_S_PER_MM ((tq_number)0.0094)
@@ -43,7 +43,7 @@ static inline int tq_simulated_write(tq_simulated *s, int output, tq_number valu
 static inline void tq_simulated_move(tq_simulated *s, const tqd_values *v, const tq_cables *c)
 {
     const tq_number step_s = (tq_number)1 / TQ_TICK_HZ;
-    int strokes = v->state == TQ_ARMED || v->state == TQ_RUNNING || v->state == TQ_RELEASING;
+    int strokes = v->state == TQ_RUNNING || v->state == TQ_RELEASING;
     tq_number turn = (tq_number)6.283185307179586 * (tq_number)v->stroke[1] * step_s;
     tq_number goal_x, goal_z, fx = 0, fz = 0;
     int n;

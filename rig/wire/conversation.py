@@ -220,8 +220,7 @@ class Conversation:
                 f"the device at {self._transport.name} did not answer for {within_s:g} s."
             )
         status = reply.body[0]
-        anew = status == _STATUS_SEQUENCE and kind != Kind.UPLOAD  # there: another place
-        if status == _STATUS_NONCE or anew:
+        if status in (_STATUS_NONCE, _STATUS_SEQUENCE):
             raise TransportLost(f"the device at {self._transport.name} has started anew.")
         if status != _STATUS_OK:
             name, meaning = self._statuses.get(status, (str(status), "unknown"))

@@ -27,7 +27,7 @@ from tests.rig.device.test_in_a_rig import device_rig
 
 WALL = """
 [wall]
-width_mm = 180
+width_mm = 100
 stiffness_n_per_mm = 0.8
 """
 

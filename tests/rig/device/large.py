@@ -19,7 +19,7 @@ def main() -> None:
         checked = compiled_walks(Path(folder), checked=True)
         subprocess.run([checked, "damaged", "17", "11000000"], check=True)
         fast = compiled_walks(Path(folder))
-        subprocess.run([fast, "paths", "6"], check=True)
+        subprocess.run([fast, "paths", "5"], check=True)
         subprocess.run([fast, "limits", "23", "100000000"], check=True)
         subprocess.run([fast, "silences", "10000"], check=True)
     with Emulator("process") as device:

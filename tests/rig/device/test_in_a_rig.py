@@ -30,7 +30,7 @@ from tests.refusals import refused
 from tests.rig.desk.rig_files import failures, rig_file
 from tests.rig.waiting import wait_until
 
-WALL = Wall(stiffness_n_per_mm=0.8, width_mm=190, length_mm=100)
+WALL = Wall(stiffness_n_per_mm=0.8, width_mm=100, length_mm=100)
 PREFIX = """[device]
 address = "ADDRESS"
 simulated = true

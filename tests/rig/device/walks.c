@@ -104,7 +104,7 @@ static void walk(const tq_virtual *from, int depth, int asked)
         now = v->device.force.state;
         if (which == RESTART || which == HELLO)
             next = which == RESTART ? NOTHING : asked;
-        else if (which == HOME && now == TQ_IDLE)
+        else if (which == HOME && v->device.homed && now != TQ_ARMED && now != TQ_RUNNING)
             next = HOMED;
         else if (which == ARM && before == TQ_IDLE && now == TQ_ARMED)
             next = asked >= HOMED ? ARMED : asked;
