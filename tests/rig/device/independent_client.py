@@ -7,6 +7,7 @@ imports nothing of tactileq: that it can talk to every device shows that the pag
 from __future__ import annotations
 
 import binascii
+import json
 import os
 import select
 import socket
@@ -14,6 +15,10 @@ import struct
 import time
 import tty
 import zlib
+from pathlib import Path
+
+_VECTORS = Path(__file__).parents[3] / "docs/device/vectors.json"
+SCHEMA_HASH = int(json.loads(_VECTORS.read_text(encoding="utf-8"))["schemaHash"], 16)
 
 HELLO, READ, WRITE, UPLOAD, EVENT = 1, 2, 3, 4, 5
 FROM_DEVICE = 128
