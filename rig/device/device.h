@@ -100,11 +100,6 @@ typedef struct {
     int simulate; /* what a simulated board has to do next, -1 for nothing */
 } tq_device;
 
-static inline size_t tq_device_size(void)
-{
-    return sizeof(tq_device);
-}
-
 /* --- Start ---------------------------------------------------------------------------------------- */
 
 /* Integral of the tracking filter's weight up to here; rig/hand/tracking.py. */

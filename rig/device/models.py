@@ -9,7 +9,7 @@ import numpy as np
 
 from modeling.errors import InputError
 from modeling.rendering.limits import Limits
-from modeling.rendering.plan import LayeredModel, Notch, RenderPlan, plan_for
+from modeling.rendering.plan import LayeredModel, Notch, plan_for
 from rig.wire.conversation import Hello
 
 MOST_LAYERS = 8
@@ -38,16 +38,9 @@ _LONGEST = 2**32 - 1
 
 @dataclass(frozen=True)
 class DeviceModel:
-    """An upload, and how a renderer on the host gives the same samples.
-
-    Parameters
-    ----------
-    data : bytes
-    plan : RenderPlan
-    """
+    """An upload."""
 
     data: bytes
-    plan: RenderPlan
 
     @property
     def hash(self) -> int:
@@ -123,4 +116,4 @@ def device_model(
         min(fields["pause"], _LONGEST),
     )
     kind = np.dtype("<f4" if hello.real_size == 4 else "<f8")
-    return DeviceModel(head + b"".join(part.astype(kind).tobytes() for part in reals), plan)
+    return DeviceModel(head + b"".join(part.astype(kind).tobytes() for part in reals))

@@ -14,16 +14,13 @@ from contextlib import suppress
 from modeling.errors import InputError
 from rig.device.definition import DEVICE
 from rig.device.registers import DeviceCommand, DeviceFlags, DeviceStatus
-from rig.force.control import Control
-from rig.force.messages import RunServo
-from rig.force.realtime import outlive_signals
+from rig.force.serving import serve_servo
 from rig.force.settings import ForceSettings
 from rig.force.states import Ask, Cause, State
 from rig.force.words import ServoWords
 from rig.hand.messages import Firmware, HandFault, Ready
 from rig.live.driven import Parent
 from rig.live.memory import BEYOND, BUTTON, CONTACT, FORCE_COMMANDED, SIMULATED, Live, now_s
-from rig.live.messages import Done
 from rig.wire.conversation import Block, DeviceRefused
 from rig.wire.link import Link
 from rig.wire.transports import opened_transport
@@ -50,22 +47,11 @@ _FLAGS = {
 
 def main() -> None:
     """Pass on what is asked and read until the parent is gone."""
-    with Parent() as parent:
-        outlive_signals()
-        wanted = parent.settings(RunServo)
-        with Live.attach(wanted.live) as live:
-            gone = threading.Event()
-            threading.Thread(target=_listen, args=(parent, live, gone), daemon=True).start()
-            DeviceServo(parent, live, wanted.settings, gone).run(patient=wanted.patient)
-
-
-def _listen(parent: Parent, live: Live, gone: threading.Event) -> None:
-    """Have the device stop once the parent is gone."""
-    with suppress(OSError):
-        parent.serve(Done, lambda done: done)
-    gone.set()
-    with suppress(TypeError):  # the memory is released already
-        Control(live).ask(Ask.STOP, within_s=0)
+    serve_servo(
+        lambda parent, live, wanted, gone: DeviceServo(parent, live, wanted.settings, gone).run(
+            patient=wanted.patient
+        )
+    )
 
 
 class DeviceServo:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from modeling.errors import InputError
-from rig.wire.transports import TransportLost
 
 try:
     import rig.device._device as _device
@@ -79,7 +78,6 @@ class VirtualTransport:
         self.board = board or VirtualBoard()
         self._buffer = self.board.ffi.new("uint8_t[]", _MOST)
         self.ticks = 0
-        self.unplugged = False
         self._held = bytearray()
 
     def now_s(self) -> float:
@@ -88,7 +86,6 @@ class VirtualTransport:
 
     def read(self, within_s: float) -> bytes:
         """See `Transport`; the device ticks once at least."""
-        self._check()
         for _ in range(max(1, round(within_s * TICK_HZ))):
             self.step(1)
             if self._held:
@@ -105,7 +102,6 @@ class VirtualTransport:
 
     def write(self, data: bytes) -> None:
         """See `Transport`."""
-        self._check()
         self.board.lib.tq_virtual_receive(self.board.address, data, len(data))
 
     def wake(self) -> None:
@@ -113,7 +109,3 @@ class VirtualTransport:
 
     def close(self) -> None:
         """Nothing to give back."""
-
-    def _check(self) -> None:
-        if self.unplugged:
-            raise TransportLost("the virtual device was unplugged.")

@@ -9,15 +9,13 @@ from __future__ import annotations
 
 import gc
 import threading
-from contextlib import suppress
 from math import nan
 from typing import Any
 
 from modeling.errors import InputError
-from rig.force.control import Control
 from rig.force.dhd import DhdLibrary
-from rig.force.messages import RunServo
-from rig.force.realtime import SERVO_PRIORITY, outlive_signals, real_time
+from rig.force.realtime import SERVO_PRIORITY, real_time
+from rig.force.serving import serve_servo
 from rig.force.settings import (
     JUMP_MM,
     MISSED_S,
@@ -25,11 +23,9 @@ from rig.force.settings import (
     VELOCITY_HZ,
     ForceSettings,
 )
-from rig.force.states import Ask
 from rig.hand.messages import HandFault, Ready
 from rig.live.driven import Parent
 from rig.live.memory import GONE, HEARTBEAT_S, SIMULATED, Live, compiled, now_s
-from rig.live.messages import Done
 
 AGAIN_S = 0.5  # between attempts to open a device that is gone
 _BEAT_S = 0.02
@@ -37,22 +33,11 @@ _BEAT_S = 0.02
 
 def main() -> None:
     """Run the servo until the parent is gone."""
-    with Parent() as parent:
-        outlive_signals()
-        wanted = parent.settings(RunServo)
-        with Live.attach(wanted.live) as live:
-            gone = threading.Event()
-            threading.Thread(target=_listen, args=(parent, live, gone), daemon=True).start()
-            _Servo(parent, live, wanted.settings, gone).run(patient=wanted.patient)
-
-
-def _listen(parent: Parent, live: Live, gone: threading.Event) -> None:
-    """Have the servo stop once the parent is gone."""
-    with suppress(OSError):
-        parent.serve(Done, lambda done: done)
-    gone.set()
-    with suppress(TypeError):  # the memory is released already
-        Control(live).ask(Ask.STOP, within_s=0)
+    serve_servo(
+        lambda parent, live, wanted, gone: _Servo(parent, live, wanted.settings, gone).run(
+            patient=wanted.patient
+        )
+    )
 
 
 class _Servo:

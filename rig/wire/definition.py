@@ -232,11 +232,6 @@ class Definition:
         return cls(file.device, file.description, file.whoAmI, (major, minor), masks, registers)
 
     @cached_property
-    def by_address(self) -> Mapping[int, Register]:
-        """The registers by their addresses."""
-        return {register.address: register for register in self.registers.values()}
-
-    @cached_property
     def sha256(self) -> str:
         """Of everything on which both sides must agree, so not of descriptions and order."""
         agreed = [

@@ -56,16 +56,17 @@ class _Waking:
         os.set_blocking(self._in, False)
         os.set_blocking(self._out, False)
 
-    def fileno(self) -> int:
-        return self._out
-
     def wake(self) -> None:
         with suppress(OSError):  # full, or closed: it wakes anyhow
             os.write(self._in, b"\0")
 
-    def clear(self) -> None:
-        with suppress(OSError):
-            os.read(self._out, _MOST)
+    def until_readable(self, of: int, within_s: float) -> bool:
+        """Wait until a descriptor can be read, this wakes, or the time is over; whether it can."""
+        ready, _, _ = select.select([of, self._out], [], [], within_s)
+        if self._out in ready:
+            with suppress(OSError):
+                os.read(self._out, _MOST)
+        return of in ready
 
     def close(self) -> None:
         for end in (self._out, self._in):
@@ -107,11 +108,7 @@ class SerialTransport:
 
     def _wait(self, within_s: float) -> None:
         if os.name == "posix":
-            ready, _, _ = select.select(
-                [self._port.fileno(), self._waking.fileno()], [], [], within_s
-            )
-            if self._waking.fileno() in ready:
-                self._waking.clear()
+            self._waking.until_readable(self._port.fileno(), within_s)
             return
         end_s = self.now_s() + within_s
         while not self._port.in_waiting and self.now_s() < end_s:
@@ -177,11 +174,7 @@ class SocketTransport:
     def read(self, within_s: float) -> bytes:
         """See `Transport`."""
         try:
-            of = self._socket.fileno()
-            ready, _, _ = select.select([of, self._waking.fileno()], [], [], within_s)
-            if self._waking.fileno() in ready:
-                self._waking.clear()
-            if of not in ready:
+            if not self._waking.until_readable(self._socket.fileno(), within_s):
                 return b""
             data = self._socket.recv(_MOST)
         except (OSError, ValueError):

@@ -110,7 +110,7 @@ def test_what_is_no_model_is_refused_and_the_one_before_stays(spoilt) -> None:  
     good = device_model(planted_texture("canvas"), HELLO)
     talk.upload(good.data, good.hash)
     data = spoilt(good.data)
-    other = type(good)(data, good.plan)
+    other = type(good)(data)
     with pytest.raises(DeviceRefused) as told:
         talk.upload(data, other.hash)
     assert told.value.status == DeviceStatus.MODEL
