@@ -18,6 +18,7 @@ from modeling import InputError
 from rig.desk.desk_rig import DeskRig
 from rig.desk.walls import largest_of
 from rig.device.emulating import Emulator
+from rig.device.registers import DeviceCause, DeviceState
 from rig.force.hand import ForceHand
 from rig.force.settings import ForceSettings
 from rig.force.states import Cause, State
@@ -145,6 +146,12 @@ def test_a_desk_rig_shows_its_wall_under_a_texture(
     assert np.all(rows.force_commanded[on])
     assert rows.force_n[on].max() > 0.2
     assert presentation.peak_g > 0.01
+
+
+def test_states_and_causes_of_the_wire_are_those_of_the_servo() -> None:
+    """The device's are reported as the servo's, number by number."""
+    for theirs, ours in ((DeviceState, State), (DeviceCause, Cause)):
+        assert {one.name: one.value for one in theirs} == {one.name: one.value for one in ours}
 
 
 def test_what_a_rig_file_says_of_a_device_has_to_fit(tmp_path: Path) -> None:
