@@ -165,6 +165,8 @@ def _input_device(device: ConnectedDevice) -> Finding:
 
 def _sound(rig: RigFile) -> Finding:
     sound = rig.sound
+    if rig.renderer is not None and sound.masking_channel is None:
+        return Finding("sound", "not used: the device renders the texture, and nothing is masked")
     return _card("sound", sound.device, "output", rate_hz=sound.rate_hz, channels=sound.channels)
 
 

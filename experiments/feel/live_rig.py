@@ -15,8 +15,8 @@ from rig.force.hand import ForceHand
 from rig.force.wall import Wall
 from rig.hand.reader import HandReader
 from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, OLDEST_READING_S, Live, now_s
-from rig.sound.output import SoundOutput
 from rig.sound.supervision import SoundLost
+from rig.sound.vibration import VibrationOutput
 
 LEVEL_S = 0.25
 MASKING_LEVEL = 0.1  # RMS, share of full scale
@@ -28,7 +28,7 @@ class LiveRig:
 
     Parameters
     ----------
-    sound : SoundOutput, optional
+    sound : VibrationOutput, optional
         Without it nothing is played.
     pointed : bool
         Whether the window's pointer is the hand (kind "window").
@@ -44,7 +44,7 @@ class LiveRig:
         self,
         live: Live,
         hand: HandReader,
-        sound: SoundOutput | None,
+        sound: VibrationOutput | None,
         *,
         pointed: bool,
         notes: Iterable[str],

@@ -12,7 +12,7 @@ from experiments.feel.view import short
 from modeling import Compensation, InputError, Limits, Vibrator, compensation_for
 from rig.desk.checks import HIGHEST_LATENCY_MS
 from rig.desk.lock import rig_locked
-from rig.desk.parts import hand_reader, sound_output
+from rig.desk.parts import hand_reader, vibration_output
 from rig.desk.walls import Walls, check_walls, usual_wall
 from rig.hand.reader import HandReader
 from rig.hand.settings import HandSettings
@@ -51,7 +51,7 @@ def desk(path: Path) -> Iterator[LiveRig]:
         live = opened.enter_context(Live.create())
         hand = opened.enter_context(hand_reader(rig, live))
         try:
-            sound = opened.enter_context(sound_output(rig, live))
+            sound = opened.enter_context(vibration_output(rig, live, hand=hand))
         except SoundLost as lost:
             raise InputError(str(lost)) from None
         felt = LiveRig(
@@ -69,7 +69,7 @@ def desk(path: Path) -> Iterator[LiveRig]:
 
 def notes_on(rig: RigFile) -> tuple[str, ...]:
     """What a visitor should know of a rig: what is simulated, assumed, or too late."""
-    scale = (rig.sound.fullscale_v, rig.vibrator.g_per_volt)
+    scale = (rig.output_v, rig.vibrator.g_per_volt)
     late = rig.latency is not None and rig.latency.p95_ms.value > HIGHEST_LATENCY_MS
     notes = {
         "simulated hand": rig.hand.kind == "scripted",

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from modeling.arrays import Floats
 from modeling.errors import InputError
 from rig.capture.input import AudioInput, InputBlock
-from rig.sound.output import Presented
+from rig.sound.vibration import Presented
 
 AROUND_S = 0.3
 LOST = "lost samples"

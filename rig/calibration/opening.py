@@ -9,20 +9,27 @@ from dataclasses import replace
 from modeling.errors import InputError
 from rig.capture.input import AudioInput
 from rig.desk.lock import rig_locked
-from rig.desk.parts import hand_settings, input_settings, sound_output
+from rig.desk.parts import hand_settings, input_settings, vibration_output
 from rig.hand.reader import HandReader
 from rig.live.memory import Live
 from rig.setup.rig_file import RigFile
-from rig.sound.output import SoundOutput
 from rig.sound.supervision import SoundLost
+from rig.sound.vibration import VibrationOutput
 
 # With these points a pen's "force" is its pressure, as a share of its range.
 PRESSURE_ITSELF = ((0.0, 0.0), (1.0, 1.0))
 
 
 @contextmanager
-def opened_sound(rig: RigFile, live: Live) -> Iterator[SoundOutput]:
-    """The open sound of a rig that no other program uses at the same time.
+def opened_sound(
+    rig: RigFile, live: Live, *, hand: HandReader | None = None
+) -> Iterator[VibrationOutput]:
+    """The open output of a rig that no other program uses at the same time.
+
+    Parameters
+    ----------
+    hand : HandReader, optional
+        Of the rig, where it is open already.
 
     Raises
     ------
@@ -30,7 +37,7 @@ def opened_sound(rig: RigFile, live: Live) -> Iterator[SoundOutput]:
         For a rig in use, and where nothing can be played, now or later in the block.
     """
     try:
-        with rig_locked(rig.rig.name), sound_output(rig, live) as sound:
+        with rig_locked(rig.rig.name), vibration_output(rig, live, hand=hand) as sound:
             yield sound
     except SoundLost as lost:
         raise InputError(str(lost)) from None

@@ -100,10 +100,8 @@ def measure_vibrator(
         raw=True,
     )
     check_unclipped(pair.recorded)
-    volts = pair.played * rig.fullscale_per_g * rig.sound.fullscale_v.value
-    return identify_vibrator(
-        volts, pair.recorded, rate_hz=pair.rate_hz, simulated=rig.sound.simulated
-    )
+    volts = pair.played * rig.fullscale_per_g * rig.output_v.value
+    return identify_vibrator(volts, pair.recorded, rate_hz=pair.rate_hz, simulated=rig.simulated)
 
 
 def mean_pressure(live: Live, *, seconds: float = PRESSURE_S) -> float:
@@ -219,7 +217,7 @@ def _played(
     raw: bool = False,
 ) -> Aligned:
     """Noise in a band, as asked for and as recorded; played again where samples were lost."""
-    rate_hz = rig.sound.rate_hz
+    rate_hz = rig.output_rate_hz
     asked = noise_signal(seconds, rate_hz=rate_hz, rms_g=rms_g, band_hz=band_hz, seed=seed)
     for attempt in range(ATTEMPTS):
         try:

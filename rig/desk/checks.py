@@ -77,7 +77,7 @@ def check_models(rig: RigFile, models: Iterable[AnyModel]) -> None:
     ------
     InputError
         For one that is not in g, or of a higher rate than the card's; for an AR model that
-        `lattice_fields` refuses.
+        `lattice_fields` refuses. Where a device renders it, as `rig.device.models.device_model`.
     """
     for model in models:
         if model.unit != "g":
@@ -85,6 +85,9 @@ def check_models(rig: RigFile, models: Iterable[AnyModel]) -> None:
                 f"expected models in g for the rig in {rig.path}, got {model.texture} in unit "
                 f"{shown(model.unit)}; record it with a calibrated sensor."
             )
+        if rig.renderer is not None:
+            _check_on_device(rig, model)
+            continue
         if model.rate_hz > rig.sound.rate_hz:
             raise InputError(
                 f"expected models of at most sound.rate_hz, {rig.sound.rate_hz:g} Hz in {rig.path},"
@@ -93,6 +96,12 @@ def check_models(rig: RigFile, models: Iterable[AnyModel]) -> None:
         plan = plan_for(model.rate_hz, rate_hz=rig.sound.rate_hz)
         if isinstance(model, ARModel):
             lattice_fields(model, plan)
+
+
+def _check_on_device(rig: RigFile, model: AnyModel) -> None:
+    from rig.device.models import ANY_DEVICE, device_model  # needs the extra rig
+
+    device_model(model, ANY_DEVICE, limits=rig.safe_limits)
 
 
 def _check_latency(rig: RigFile, override: str | None) -> None:

@@ -22,7 +22,7 @@ from modeling.rendering.plan import RenderCounters
 from rig.desk.checks import Requirements, check_rig
 from rig.desk.journal import Journal
 from rig.desk.lock import rig_locked
-from rig.desk.parts import hand_reader, sound_output
+from rig.desk.parts import hand_reader, vibration_output
 from rig.desk.pen import Pen
 from rig.desk.stimuli import check_made_for, check_stimulus
 from rig.desk.walls import Walls, check_walls, usual_wall
@@ -43,9 +43,9 @@ from rig.interface import (
 )
 from rig.live.memory import GONE, OLDEST_READING_S, Live, now_s
 from rig.setup.rig_file import RigFile
-from rig.sound.output import Presented, SoundOutput
 from rig.sound.signals import tone_burst
 from rig.sound.supervision import SoundLost
+from rig.sound.vibration import Presented, VibrationOutput
 
 FIRST_READING_S = 5.0
 LOOK_S = 0.1  # interval of checks while waiting for a burst
@@ -56,7 +56,7 @@ class RigParts:
     """What an open rig consists of."""
 
     live: Live
-    sound: SoundOutput
+    sound: VibrationOutput
     reader: HandReader
     journal: Journal
     pen: Pen | None
@@ -178,8 +178,9 @@ class DeskRig:
         with ExitStack() as stack:
             stack.enter_context(rig_locked(self._file.rig.name))
             live = stack.enter_context(Live.create())
-            sound = sound_output(self._file, live, seed=self._seed)
-            reader = stack.enter_context(hand_reader(self._file, live))
+            reader = hand_reader(self._file, live, seed=self._seed)
+            sound = vibration_output(self._file, live, hand=reader, seed=self._seed)
+            stack.enter_context(reader)
             _wait_for_reading(live)
             stack.callback(sound.close)
             try:
@@ -191,7 +192,7 @@ class DeskRig:
             journal = Journal(
                 live,
                 opened_s=self._opened_s,
-                rate_hz=self._file.sound.rate_hz,
+                rate_hz=self._file.output_rate_hz,
                 real_measured=self._file.real_surface.hand_measured,
             )
             stack.enter_context(journal)
@@ -301,7 +302,7 @@ class DeskRig:
             burst.frequency_hz,
             burst.amplitude_g,
             duration_s=burst.duration_s,
-            rate_hz=self._file.sound.rate_hz,
+            rate_hz=self._file.output_rate_hz,
         )
         return made.samples_g
 
@@ -383,9 +384,9 @@ class DeskRig:
                 self._now,
                 end_s=end_s - self._opened_s,
                 counters=counted.counters if counted and self._playing else RenderCounters(),
-                played_s=played.frames / self._file.sound.rate_hz,
-                dose_g2_s=played.square_sum_g2 / self._file.sound.rate_hz,
-                weighted_dose_g2_s=played.weighted_square_sum_g2 / self._file.sound.rate_hz,
+                played_s=played.frames / self._file.output_rate_hz,
+                dose_g2_s=played.square_sum_g2 / self._file.output_rate_hz,
+                weighted_dose_g2_s=played.weighted_square_sum_g2 / self._file.output_rate_hz,
                 peak_g=played.peak_g,
                 misses=played.misses,
                 stale_blocks=played.stale,

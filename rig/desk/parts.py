@@ -2,24 +2,36 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
-from modeling.vibrators.compensation import compensation_for
+from modeling.vibrators.compensation import Compensation, compensation_for
+from modeling.vibrators.exposure import hand_arm_sections
 from rig.capture.input import InputSettings
 from rig.force.hand import ForceHand
-from rig.force.settings import ForceSettings, Pose
+from rig.force.settings import ForceSettings, Pose, Vibration
 from rig.hand.reader import HandReader
 from rig.hand.settings import HandSettings
 from rig.live.memory import Live
 from rig.setup.rig_file import RigFile
 from rig.setup.sections import AccelerometerSection
 from rig.sound.output import SoundOutput
+from rig.sound.vibration import VibrationOutput
 
 SILENT_S = 0.06  # beyond three blocks: a wall is released where nothing was played for so long
 
 
-def sound_output(rig: RigFile, live: Live, *, seed: int = 0) -> SoundOutput:
-    """What plays, not opened yet.
+def vibration_output(
+    rig: RigFile, live: Live, *, hand: HandReader | None = None, seed: int = 0
+) -> VibrationOutput:
+    """What plays, not opened yet: the sound card, or a device that renders the texture.
+
+    Parameters
+    ----------
+    hand : HandReader, optional
+        Of this rig, opened by others before this; without it a device is opened and closed with
+        this output.
 
     Raises
     ------
@@ -27,10 +39,38 @@ def sound_output(rig: RigFile, live: Live, *, seed: int = 0) -> SoundOutput:
         For limits beyond what the card can play, or a vibrator that cannot be compensated at its
         rate.
     """
-    sound, masking = rig.sound, rig.sound.masking_channel
-    compensation = None
-    if rig.identified is not None:
-        compensation = compensation_for(rig.identified, rate_hz=sound.rate_hz)
+    if rig.renderer is None:
+        return sound_output(rig, live, seed=seed)
+    from rig.device.hand import DeviceHand  # needs the extra rig
+    from rig.device.sound import DeviceSound
+
+    opens = hand is None
+    if hand is None:
+        hand = hand_reader(rig, live, seed=seed)
+    assert isinstance(hand, DeviceHand)
+    masked = None
+    if rig.sound.masking_channel is not None:
+        masked = partial(sound_output, rig, seed=seed)
+    return DeviceSound(
+        live,
+        hand,
+        opens=opens,
+        scale=rig.fullscale_per_g,
+        limits=rig.safe_limits,
+        compensation=_compensation(rig),
+        masked=masked,
+    )
+
+
+def _compensation(rig: RigFile) -> Compensation | None:
+    if rig.identified is None:
+        return None
+    return compensation_for(rig.identified, rate_hz=rig.output_rate_hz)
+
+
+def sound_output(rig: RigFile, live: Live, *, seed: int = 0) -> SoundOutput:
+    """The sound card, not opened yet; of a device that renders it plays the masking noise only."""
+    sound, masking, plays = rig.sound, rig.sound.masking_channel, rig.renderer is None
     return SoundOutput(
         live,
         device=sound.device,
@@ -39,9 +79,9 @@ def sound_output(rig: RigFile, live: Live, *, seed: int = 0) -> SoundOutput:
         channels=sound.channels,
         vibration_channel=sound.vibration_channel - 1,
         masking_channel=None if masking is None else masking - 1,
-        fullscale_per_g=rig.fullscale_per_g,
-        limits=rig.safe_limits,
-        compensation=compensation,
+        fullscale_per_g=rig.fullscale_per_g if plays else 1.0,
+        limits=rig.safe_limits if plays else replace(rig.safe_limits, peak=1.0),
+        compensation=_compensation(rig) if plays else None,
         seed=seed,
         vibrator=rig.identified,
     )
@@ -65,20 +105,28 @@ def hand_settings(rig: RigFile) -> HandSettings:
     )
 
 
-def hand_reader(rig: RigFile, live: Live) -> HandReader:
+def hand_reader(rig: RigFile, live: Live, *, seed: int = 0) -> HandReader:
     """What reads the hand, not opened yet; a `ForceHand` where it also pushes."""
     settings = hand_settings(rig)
-    force = force_settings(rig)
-    return HandReader(live, settings) if force is None else ForceHand(live, settings, force)
+    force = force_settings(rig, seed=seed)
+    if force is None:
+        return HandReader(live, settings)
+    if rig.own_device is None:
+        return ForceHand(live, settings, force)
+    from rig.device.hand import DeviceHand  # needs the extra rig
+
+    return DeviceHand(live, settings, force)
 
 
-def force_settings(rig: RigFile, *, sounds: bool = True) -> ForceSettings | None:
+def force_settings(rig: RigFile, *, sounds: bool = True, seed: int = 0) -> ForceSettings | None:
     """The force device in plain numbers; None of a rig without one.
 
     Parameters
     ----------
     sounds : bool
         Whether the rig also plays: then a wall is released where the sound ends.
+    seed : int
+        Of the noise of a device that renders the texture.
     """
     force, pose, device = rig.force_device, rig.pose, rig.own_device
     if force is None:
@@ -105,8 +153,20 @@ def force_settings(rig: RigFile, *, sounds: bool = True) -> ForceSettings | None
         pose=Pose()
         if pose is None
         else Pose(origin_mm=pose.origin_mm, x=pose.x, y=pose.y, z=pose.z),
-        sound_s=SILENT_S + 3 * period_s if sounds else 0.0,
+        sound_s=SILENT_S + 3 * period_s if sounds and rig.renderer is None else 0.0,
         simulated=rig.simulated,
+        vibration=_vibration(rig, seed),
+    )
+
+
+def _vibration(rig: RigFile, seed: int) -> Vibration | None:
+    if rig.renderer is None:
+        return None
+    return Vibration(
+        peak_g=rig.limits.peak_g.value,
+        scale=rig.fullscale_per_g,
+        weighting=hand_arm_sections(rig.output_rate_hz, vibrator=rig.identified).tobytes(),
+        seed=seed,
     )
 
 

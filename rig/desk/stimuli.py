@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from modeling import InputError
-from rig.desk.parts import sound_output
+from rig.desk.parts import vibration_output
 from rig.interface import PreparedSignal, Stimulus
 from rig.live.memory import Live
 from rig.setup.rig_file import RigFile
@@ -20,7 +20,7 @@ def check_stimulus(rig: RigFile, stimulus: Stimulus) -> None:
     which = f"the stimulus of {stimulus.texture}"
     check_made_for(rig, stimulus, which)
     with Live.create() as live:
-        sound = sound_output(rig, live)
+        sound = vibration_output(rig, live)
         try:
             sound.checked(stimulus.samples_g, compensated=stimulus.vibrator_sha256 is not None)
         except InputError as error:
@@ -28,7 +28,7 @@ def check_stimulus(rig: RigFile, stimulus: Stimulus) -> None:
 
 
 def check_made_for(rig: RigFile, signal: PreparedSignal, which: str) -> None:
-    """Refuse a signal at another rate than the card's, or for another vibrator than the rig's.
+    """Refuse a signal at another rate than the output's, or for another vibrator than the rig's.
 
     Parameters
     ----------
@@ -39,9 +39,10 @@ def check_made_for(rig: RigFile, signal: PreparedSignal, which: str) -> None:
     ------
     InputError
     """
-    if signal.rate_hz != rig.sound.rate_hz:
+    if signal.rate_hz != rig.output_rate_hz:
+        plays = "the card" if rig.renderer is None else "the device"
         raise InputError(
-            f"expected a file at {rig.sound.rate_hz:g} Hz, the rate of the card, got {which} at "
+            f"expected a file at {rig.output_rate_hz:g} Hz, the rate of {plays}, got {which} at "
             f"{signal.rate_hz:g} Hz; make the set with that rate_hz."
         )
     wanted = signal.vibrator_sha256

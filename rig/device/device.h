@@ -25,7 +25,8 @@ enum {
     TQ_FLUSH_TICKS = TQ_TICK_HZ / 500,   /* a record waits no longer for others of its frame */
     TQ_RECORDS = 64, TQ_PER_FRAME = 10, TQ_RECORD_BYTES = 21, TQ_EVENT_HEADER = 11,
     TQ_SAMPLES = 1024, TQ_MOST_QUEUED = 1000,
-    TQ_TAPS = 20,                        /* of the tracking filter: twice its delay of 10 ms */
+    TQ_TAPS = 64,                        /* of the tracking filter at most: twice its delay in ms */
+    TQ_WEIGHTS = 4,                      /* sections of the weighting of exposure */
     TQ_OUTPUTS = 3, TQ_VIBRATOR = 2
 };
 
@@ -41,6 +42,7 @@ typedef struct {
     void (*lock)(void *context);
     void (*unlock)(void *context);
     tq_cables cables;
+    float most_g;     /* what the vibrator's converter takes at most */
     uint32_t entropy; /* differs from one start to the next */
     uint32_t baud;    /* of the port; 0 where it has none */
     int simulated;    /* whether there is no hand */
@@ -69,8 +71,8 @@ typedef struct {
     int counting, homed;
     tq_number rest_mm[TQ_MOTORS], length_mm[TQ_MOTORS]; /* of the cables, at home and now */
     /* Speed along x: the tracking filter on one position in a millisecond. */
-    float track_mm[TQ_TAPS + 1], weights[TQ_TAPS];
-    int tracked;
+    float track_mm[2 * TQ_TAPS], weights[TQ_TAPS]; /* twice in a row, from track_at on the oldest first */
+    int tracked, taps, track_at;
     /* Currents and what they heat. */
     tq_number current_a[TQ_MOTORS], heat_a2_s[TQ_MOTORS];
     int clipped, failing, releasing;
@@ -91,6 +93,10 @@ typedef struct {
     int block_at;
     uint32_t read_tick; /* readings so far */
     tq_number vibration_g;
+    /* Sums over what was played: the samples since the last reading, and what is below 1e-6 g². */
+    float recent_g[TQ_READ_TICKS], peak_g, square_left, weighted_left, weighted[TQ_WEIGHTS][2];
+    int recent, sections;
+    uint32_t missed; /* before this source */
     /* Records, from the tick to the main loop. */
     tq_record records[TQ_RECORDS];
     volatile uint32_t records_in, records_out;
@@ -116,6 +122,7 @@ static inline void tq_device_defaults(tq_device *d)
     v->tick_rate = TQ_TICK_HZ, v->real_size = sizeof(tq_real), v->most_layers = TQ_MOST_LAYERS;
     v->model_capacity = sizeof d->uploads[0].bytes;
     v->wall[0] = 0, v->wall[1] = 1, v->wall[2] = 0, v->wall[3] = 100, v->wall[4] = 300;
+    v->frozen_time = 0.25f, v->release_time = 0.02f, v->speed_delay = 10, v->vibration_scale = 1;
     v->force_limit = 5, v->force_slew = 2000, v->power_limit = 5, v->speed_limit = 1000;
     v->workspace[0] = -210, v->workspace[1] = 210, v->workspace[2] = -60, v->workspace[3] = -5;
     v->current_limit = 6, v->heat_limit = 20, v->vibration_limit = 5;
@@ -131,7 +138,7 @@ static inline void tq_device_limit(tq_device *d)
     const tqd_values *v = &d->values;
     int n;
     memset(l, 0, sizeof *l);
-    l->late_s = 1, l->frozen_s = (tq_number)0.25, l->release_s = (tq_number)0.02, l->show_s = (tq_number)0.2;
+    l->late_s = 1, l->frozen_s = v->frozen_time, l->release_s = v->release_time, l->show_s = (tq_number)0.2;
     l->most_n = v->force_limit, l->most_n_per_s = v->force_slew, l->most_w = v->power_limit;
     l->most_mm_s = v->speed_limit, l->jump_mm = 1, l->velocity_hz = 100;
     l->low_mm[0] = v->workspace[0], l->high_mm[0] = v->workspace[1];
@@ -140,6 +147,16 @@ static inline void tq_device_limit(tq_device *d)
     l->origin_mm[2] = -50;
     for (n = 0; n < 3; n++)
         l->axes[4 * n] = 1;
+}
+
+/* The tracking filter with this delay, anew. */
+static inline void tq_device_track(tq_device *d)
+{
+    int n, taps = 2 * d->values.speed_delay;
+    for (n = 0; n < taps; n++)
+        d->weights[n] = (tq_smooth((float)(n + 1) / (float)taps) - tq_smooth((float)n / (float)taps))
+                        * (float)(TQ_TICK_HZ / TQ_READ_TICKS);
+    d->taps = taps, d->tracked = d->track_at = 0;
 }
 
 /* The tool stands in its rest: the counters start from the lengths that the cables have there. */
@@ -168,9 +185,8 @@ static inline void tq_device_start(tq_device *d, const tq_board *board)
     for (n = 0; n < TQ_MOTORS; n++)
         d->rest_mm[n] =
             tq_cable_length(&board->cables, n, board->cables.rest_x_mm, board->cables.rest_z_mm);
-    for (n = 0; n < TQ_TAPS; n++)
-        d->weights[n] = (tq_smooth((float)(n + 1) / TQ_TAPS) - tq_smooth((float)n / TQ_TAPS))
-                        * (float)(TQ_TICK_HZ / TQ_READ_TICKS);
+    tq_device_track(d);
+    d->values.vibration_range = board->most_g;
     d->values.stiffness_limit = (float)tq_largest_stiffness(
         board->cables.damping_n_s_per_mm, 0, (tq_number)1 / TQ_TICK_HZ, (tq_number)1 / TQ_TICK_HZ);
     d->values.state = (uint8_t)d->force.state;
@@ -303,7 +319,7 @@ static inline void tq_device_act(tq_device *d)
     int failed = 0, n;
     for (n = 0; n < TQ_MOTORS; n++)
         failed |= d->board.write(d->board.context, n, d->current_a[n]);
-    failed |= d->board.write(d->board.context, TQ_VIBRATOR, d->vibration_g);
+    failed |= d->board.write(d->board.context, TQ_VIBRATOR, d->vibration_g * (tq_number)d->values.vibration_scale);
     d->failing = failed;
 }
 
@@ -312,19 +328,31 @@ static inline void tq_device_act(tq_device *d)
 /* Speed along x by the tracking filter, once in a millisecond. */
 static inline float tq_device_speed(tq_device *d)
 {
-    float speed = 0;
-    int n;
+    float x = (float)d->force.position_mm[0], before, speed = 0;
+    const float *past;
+    int n, taps = d->taps;
     if (!d->tracked)
-        for (n = 0; n <= TQ_TAPS; n++)
-            d->track_mm[n] = (float)d->force.position_mm[0];
+        for (n = 0; n < 2 * taps; n++)
+            d->track_mm[n] = x;
     d->tracked = 1;
-    for (n = 0; n < TQ_TAPS; n++) {
-        d->track_mm[n] = d->track_mm[n + 1];
-        if (n)
-            speed += (d->track_mm[n] - d->track_mm[n - 1]) * d->weights[n - 1];
+    past = d->track_mm + d->track_at, before = past[0];
+    for (n = 1; n < taps; n++) {
+        speed += (past[n] - before) * d->weights[n - 1];
+        before = past[n];
     }
-    d->track_mm[TQ_TAPS] = (float)d->force.position_mm[0];
-    return speed + (d->track_mm[TQ_TAPS] - d->track_mm[TQ_TAPS - 1]) * d->weights[TQ_TAPS - 1];
+    d->track_mm[d->track_at] = d->track_mm[d->track_at + taps] = x;
+    d->track_at = d->track_at + 1 < taps ? d->track_at + 1 : 0;
+    return speed + (x - before) * d->weights[taps - 1];
+}
+
+/* Whether the model renders: while it is the source, and afterwards without a hand, until it has faded out,
+   another one has taken its place and the limit of duration has seen a pause. Then it stands still. */
+static inline int tq_device_renders(const tq_device *d)
+{
+    if (!d->playing || d->values.source == TQD_SOURCE_HOST)
+        return 0;
+    return d->values.source == TQD_SOURCE_MODEL || d->hand.now != d->hand.wanted || d->hand.state.sounding
+           || !tq_scene_silent(&d->hand);
 }
 
 /* The model's samples from this reading to the next: as many bits as one by one, at half the cost. */
@@ -332,9 +360,7 @@ static inline void tq_device_model_block(tq_device *d)
 {
     tq_real block[TQ_READ_TICKS];
     int n;
-    if (!d->playing)
-        return;
-    tq_scene_read(&d->hand, 0, d->values.speed, d->values.force);
+    tq_scene_read(&d->hand, 0, d->values.speed, d->values.source == TQD_SOURCE_MODEL ? d->values.force : 0);
     tq_scene_render_on(&d->hand, block, TQ_READ_TICKS);
     for (n = 0; n < TQ_READ_TICKS; n++)
         d->block_g[n] = (float)block[n];
@@ -358,7 +384,51 @@ static inline float tq_device_host_sample(tq_device *d)
     return 0.9f * d->values.vibration; /* a step to 0 would be felt */
 }
 
-/* The next sample. A model that is not played stands still. */
+/* A sample after the weighting of exposure (transposed direct form II). */
+static inline float tq_device_weigh(tq_device *d, float x)
+{
+    int n;
+    for (n = 0; n < d->sections; n++) {
+        const float *c = d->values.weighting + 5 * n;
+        float *state = d->weighted[n], y = c[0] * x + state[0];
+        state[0] = c[1] * x - c[3] * y + state[1];
+        state[1] = c[2] * x - c[4] * y;
+        if (state[0] < 1e-20f && state[0] > -1e-20f) /* no numbers that are slow to compute with */
+            state[0] = 0;
+        if (state[1] < 1e-20f && state[1] > -1e-20f)
+            state[1] = 0;
+        x = y;
+    }
+    return d->sections ? x : 0;
+}
+
+/* Adds a rest and a sum to a whole number of 1e-6 g²; what is less stays for the next time. */
+static inline void tq_device_add(uint64_t *sum, float *left, float square)
+{
+    uint32_t whole;
+    *left += square;
+    whole = (uint32_t)(*left * 1e6f); /* of five samples at most 2e9 */
+    *sum += whole, *left -= (float)whole * 1e-6f;
+}
+
+/* Takes the samples since the last reading into the sums. */
+static inline void tq_device_sum(tq_device *d)
+{
+    float square = 0, weighted = 0;
+    int n;
+    for (n = 0; n < d->recent; n++) {
+        float x = d->recent_g[n], y = tq_device_weigh(d, x), size = x < 0 ? -x : x;
+        square += x * x, weighted += y * y;
+        d->values.played[0] += x != 0 || d->values.source != TQD_SOURCE_NOTHING;
+        if (size > d->peak_g)
+            d->peak_g = size;
+    }
+    d->recent = 0;
+    tq_device_add(&d->values.played[1], &d->square_left, square);
+    tq_device_add(&d->values.played[2], &d->weighted_left, weighted);
+}
+
+/* The next sample. */
 static inline void tq_device_vibrate(tq_device *d, int reads)
 {
     float sample = 0, most = d->values.vibration_limit;
@@ -366,16 +436,22 @@ static inline void tq_device_vibrate(tq_device *d, int reads)
         float newton = d->force.normal_n > 0 ? (float)d->force.normal_n : 0;
         d->values.speed = tq_device_speed(d);
         d->values.force = newton >= d->values.contact_force ? newton : 0;
+        if (tq_device_renders(d))
+            tq_device_model_block(d);
     }
-    if (d->values.source == TQD_SOURCE_MODEL && reads)
-        tq_device_model_block(d);
-    if (d->values.source == TQD_SOURCE_MODEL && d->block_at < TQ_READ_TICKS)
-        sample = d->block_g[d->block_at++];
-    else if (d->values.source == TQD_SOURCE_HOST)
+    if (d->values.source == TQD_SOURCE_HOST)
         sample = tq_device_host_sample(d);
-    if (!(sample - sample == 0)) /* not a number: never with a model that was checked */
-        sample = 0;
-    sample = sample > most ? most : sample < -most ? -most : sample;
+    else if (d->block_at < TQ_READ_TICKS)
+        sample = d->block_g[d->block_at++];
+    else if (d->values.vibration > 1e-4f || d->values.vibration < -1e-4f)
+        sample = 0.9f * d->values.vibration; /* the host's samples ended in their midst */
+    if (!(sample <= most && sample >= -most)) { /* not a number: never with a model that was checked */
+        sample = sample > most ? most : sample < -most ? -most : 0;
+        d->values.played[4]++;
+    }
+    d->recent_g[d->recent++] = sample;
+    if (d->recent == TQ_READ_TICKS)
+        tq_device_sum(d);
     d->values.vibration = sample, d->vibration_g = (tq_number)sample;
 }
 
@@ -410,7 +486,8 @@ static inline void tq_device_record(tq_device *d, int button)
 static inline int tq_device_pace(const tq_device *d)
 {
     int state = d->force.state, idle = state == TQ_BOOT || state == TQ_IDLE || state == TQ_FAULT;
-    return idle && !d->record_every && d->values.source == TQD_SOURCE_NOTHING ? TQ_REST_TICKS : 1;
+    int quiet = d->values.source == TQD_SOURCE_NOTHING && d->values.vibration == 0 && !tq_device_renders(d);
+    return idle && quiet && !d->record_every ? TQ_REST_TICKS : 1;
 }
 
 /* One tick, or `ticks` in one: the encoders' counters, modulo 2^16, and the button. */
@@ -554,6 +631,23 @@ static inline int tq_device_carries(const tq_device *d, uint32_t rate)
     return !d->board.baud || bytes <= d->board.baud / 10 / 5 * 4;
 }
 
+/* How many sections of a weighting are given, the others being 0; -1 where one of them is not stable. */
+static inline int tq_device_sections(const uint8_t *value)
+{
+    float section[5];
+    int n, count = 0;
+    for (n = 0; n < TQ_WEIGHTS; n++) {
+        float a1, a2;
+        memcpy(section, value + sizeof section * (size_t)n, sizeof section);
+        a1 = section[3] < 0 ? -section[3] : section[3], a2 = section[4];
+        if (!(a2 < 1 && a1 < 1 + a2))
+            return -1;
+        if (section[0] != 0 || section[1] != 0 || section[2] != 0)
+            count = n + 1;
+    }
+    return count;
+}
+
 /* What a value must be beside its range. */
 static inline int tq_device_accepts(const tq_device *d, uint8_t address, const uint8_t *value)
 {
@@ -571,6 +665,8 @@ static inline int tq_device_accepts(const tq_device *d, uint8_t address, const u
     case TQD_TENSION_RANGE:
         memcpy(x, value, 2 * sizeof x[0]);
         return x[0] < x[1];
+    case TQD_WEIGHTING:
+        return tq_device_sections(value) >= 0;
     case TQD_EVENT_RATE:
         return tq_device_carries(d, (uint32_t)(value[0] | value[1] << 8));
     default:
@@ -612,9 +708,21 @@ static inline int tq_device_apply(tq_device *d, const tqd_register *r, const uin
         d->record_number = 0, d->records_out = d->records_in;
         break;
     case TQD_SOURCE:
-        d->block_at = TQ_READ_TICKS;
         if (v->source != TQD_SOURCE_HOST)
             d->samples_out = d->samples_in;
+        if (v->source != TQD_SOURCE_NOTHING) {
+            d->block_at = v->source == TQD_SOURCE_HOST ? TQ_READ_TICKS : d->block_at, d->recent = 0;
+            memset(v->played, 0, sizeof v->played);
+            d->missed = v->samples_missed + v->ticks_late;
+            d->peak_g = d->square_left = d->weighted_left = 0;
+        }
+        break;
+    case TQD_WEIGHTING:
+        d->sections = tq_device_sections(value);
+        memset(d->weighted, 0, sizeof d->weighted);
+        break;
+    case TQD_SPEED_DELAY:
+        tq_device_track(d);
         break;
     case TQD_SIMULATE:
         d->simulate = v->simulate;
@@ -640,6 +748,17 @@ static inline void tq_device_look(tq_device *d, const tqd_register *r, uint8_t *
         v->tick_clocks[0] = d->clocks_ticks ? d->clocks_sum / d->clocks_ticks : 0;
         v->tick_clocks[1] = d->clocks_most;
         d->clocks_ticks = d->clocks_sum = d->clocks_most = 0;
+    }
+    if (r->address == TQD_PLAYED) {
+        v->played[3] = (uint64_t)(d->peak_g * 1e6f);
+        v->played[5] = v->samples_missed + v->ticks_late - d->missed;
+        d->peak_g = 0;
+    }
+    if (r->address == TQD_CORRECTIONS && d->playing) {
+        const tq_counters *c = &d->hand.state.counters;
+        v->corrections[0] = c->lift_offs, v->corrections[1] = c->above_grid, v->corrections[2] = c->below_grid;
+        v->corrections[3] = c->clamped, v->corrections[4] = c->peak, v->corrections[5] = c->rms;
+        v->corrections[6] = c->duration;
     }
     memcpy(value, (const uint8_t *)v + r->offset, (size_t)r->bytes * r->length);
 }

@@ -8,14 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from modeling.errors import InputError
+from modeling.models.ar_model import ARModel
+from modeling.models.loading import AnyModel
 from modeling.rendering.limits import Limits
-from modeling.rendering.plan import LayeredModel, Notch, plan_for
+from modeling.rendering.plan import Notch, plan_for
+from rig.device.definition import DEVICE
 from rig.wire.conversation import Hello
 
 MOST_LAYERS = 8
 CAPACITY_REALS = 2048
 # What the device needs: no limit of a model may be infinite.
-DEVICE_LIMITS = Limits(peak=5.0, rms=2.0, duration_s=60.0, pause_s=3.0)
+DEVICE_LIMITS = Limits(peak=5.0, rms=2.0, duration_s=60.0, pause_s=0.1)
+ANY_DEVICE = Hello(DEVICE.who_am_i, DEVICE.firmware_version, DEVICE.schema_hash, 5000.0, 8, 0)
 _HEAD = struct.Struct("<4s4B3I4x")
 _SCALARS = (
     "model_rate_hz",
@@ -52,7 +56,7 @@ class DeviceModel:
 
 
 def device_model(
-    model: LayeredModel,
+    model: AnyModel,
     hello: Hello,
     *,
     limits: Limits = DEVICE_LIMITS,
@@ -72,9 +76,14 @@ def device_model(
     Raises
     ------
     InputError
-        For another rate, more layers or a larger grid than the device holds, a limit that is
-        infinite, or numbers that single precision cannot hold.
+        For an AR model, another rate, more layers or a larger grid than the device holds, a limit
+        that is infinite, or numbers that single precision cannot hold.
     """
+    if isinstance(model, ARModel):
+        raise InputError(
+            f"expected a model with layers for the device, got the AR model of {model.texture}; "
+            "render it with the sound card, or fit a model to its spectrum."
+        )
     if model.rate_hz != hello.tick_rate_hz:
         raise InputError(
             f"expected a model of {hello.tick_rate_hz:g} Hz for the device, got one of "

@@ -9,8 +9,8 @@
 #include <stdint.h>
 
 #define TQD_WHO_AM_I_VALUE 29012
-#define TQD_FIRMWARE_VERSION_VALUE 256
-#define TQD_SCHEMA_HASH_VALUE UINT64_C(0x457ca80cf373bd8f)
+#define TQD_FIRMWARE_VERSION_VALUE 257
+#define TQD_SCHEMA_HASH_VALUE UINT64_C(0xb9d03be05edbe318)
 
 /* Addresses. */
 enum {
@@ -31,6 +31,8 @@ enum {
     TQD_SAMPLES_QUEUED = 15,
     TQD_EVENT_RATE = 16,
     TQD_SEED = 17,
+    TQD_FROZEN_TIME = 18,
+    TQD_RELEASE_TIME = 19,
     TQD_FORCE_LIMIT = 20,
     TQD_FORCE_SLEW = 21,
     TQD_POWER_LIMIT = 22,
@@ -42,6 +44,7 @@ enum {
     TQD_CONTACT_FORCE = 28,
     TQD_STIFFNESS_LIMIT = 29,
     TQD_VIBRATION_LIMIT = 30,
+    TQD_SPEED_DELAY = 31,
     TQD_POSITION = 32,
     TQD_DEPTH = 33,
     TQD_SPEED = 34,
@@ -51,6 +54,11 @@ enum {
     TQD_HEAT = 38,
     TQD_VIBRATION = 39,
     TQD_BUTTON = 40,
+    TQD_VIBRATION_SCALE = 41,
+    TQD_VIBRATION_RANGE = 42,
+    TQD_WEIGHTING = 43,
+    TQD_PLAYED = 44,
+    TQD_CORRECTIONS = 45,
     TQD_TICK = 48,
     TQD_HEARD_TICK = 49,
     TQD_FAULT_TICK = 50,
@@ -116,7 +124,7 @@ enum {
 /* What the vibrator plays. */
 enum {
     TQD_SOURCE_NOTHING = 0,
-    TQD_SOURCE_MODEL = 1, /* the model that was uploaded, under the tool */
+    TQD_SOURCE_MODEL = 1, /* the model that was uploaded, under the tool; it fades out when another source is set */
     TQD_SOURCE_HOST = 2, /* samples that the host writes to Samples */
 };
 
@@ -163,6 +171,8 @@ enum {
 typedef struct {
     uint64_t schema_hash;
     uint64_t seed;
+    uint64_t played[6];
+    uint64_t corrections[7];
     uint64_t model_hash;
     float tick_rate;
     uint32_t model_capacity;
@@ -178,8 +188,13 @@ typedef struct {
     float heat_limit;
     float tension_range[2];
     float contact_force;
+    float frozen_time;
+    float release_time;
     float vibration_limit;
     float stiffness_limit;
+    float vibration_scale;
+    float vibration_range;
+    float weighting[20];
     float position[2];
     float depth;
     float speed;
@@ -211,6 +226,7 @@ typedef struct {
     uint8_t cause;
     uint8_t command;
     uint8_t source;
+    uint8_t speed_delay;
     uint8_t button;
     uint8_t shutdown_error;
     uint8_t simulate;
@@ -245,6 +261,8 @@ static const tqd_range tqd_ranges[] = {
     { -50.0f, 50.0f }, /* Samples */
     { 0.0f, 5000.0f }, /* EventRate */
     { 0.0f, 1.8446744073709552e+19f }, /* Seed */
+    { 0.005f, 5.0f }, /* FrozenTime */
+    { 0.001f, 0.5f }, /* ReleaseTime */
     { 0.1f, 20.0f }, /* ForceLimit */
     { 1.0f, 100000.0f }, /* ForceSlew */
     { 0.01f, 100.0f }, /* PowerLimit */
@@ -255,6 +273,9 @@ static const tqd_range tqd_ranges[] = {
     { 0.0f, 100.0f }, /* TensionRange */
     { 0.001f, 5.0f }, /* ContactForce */
     { 0.1f, 20.0f }, /* VibrationLimit */
+    { 1.0f, 32.0f }, /* SpeedDelay */
+    { 1e-06f, 1000000.0f }, /* VibrationScale */
+    { -1000000.0f, 1000000.0f }, /* Weighting */
     { 0.0f, 7.0f }, /* Simulate */
     { 0.0f, 150.0f }, /* Stroke */
     { 0.0f, 5.0f }, /* Stroke */
@@ -279,17 +300,20 @@ static const tqd_register tqd_registers[] = {
     { TQD_SAMPLES_QUEUED, TQD_INTEGER, 2, 1, TQD_READS, 0, 0, offsetof(tqd_values, samples_queued) },
     { TQD_EVENT_RATE, TQD_INTEGER, 2, 1, TQD_READS | TQD_WRITES, 9, 0, offsetof(tqd_values, event_rate) },
     { TQD_SEED, TQD_INTEGER, 8, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 10, 0, offsetof(tqd_values, seed) },
-    { TQD_FORCE_LIMIT, TQD_FLOAT, 4, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 11, 0, offsetof(tqd_values, force_limit) },
-    { TQD_FORCE_SLEW, TQD_FLOAT, 4, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 12, 0, offsetof(tqd_values, force_slew) },
-    { TQD_POWER_LIMIT, TQD_FLOAT, 4, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 13, 0, offsetof(tqd_values, power_limit) },
-    { TQD_SPEED_LIMIT, TQD_FLOAT, 4, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 14, 0, offsetof(tqd_values, speed_limit) },
-    { TQD_WORKSPACE, TQD_FLOAT, 4, 4, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 15, 0, offsetof(tqd_values, workspace) },
-    { TQD_CURRENT_LIMIT, TQD_FLOAT, 4, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 16, 0, offsetof(tqd_values, current_limit) },
-    { TQD_HEAT_LIMIT, TQD_FLOAT, 4, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 17, 0, offsetof(tqd_values, heat_limit) },
-    { TQD_TENSION_RANGE, TQD_FLOAT, 4, 2, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 18, 0, offsetof(tqd_values, tension_range) },
-    { TQD_CONTACT_FORCE, TQD_FLOAT, 4, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 19, 0, offsetof(tqd_values, contact_force) },
+    { TQD_FROZEN_TIME, TQD_FLOAT, 4, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 11, 0, offsetof(tqd_values, frozen_time) },
+    { TQD_RELEASE_TIME, TQD_FLOAT, 4, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 12, 0, offsetof(tqd_values, release_time) },
+    { TQD_FORCE_LIMIT, TQD_FLOAT, 4, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 13, 0, offsetof(tqd_values, force_limit) },
+    { TQD_FORCE_SLEW, TQD_FLOAT, 4, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 14, 0, offsetof(tqd_values, force_slew) },
+    { TQD_POWER_LIMIT, TQD_FLOAT, 4, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 15, 0, offsetof(tqd_values, power_limit) },
+    { TQD_SPEED_LIMIT, TQD_FLOAT, 4, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 16, 0, offsetof(tqd_values, speed_limit) },
+    { TQD_WORKSPACE, TQD_FLOAT, 4, 4, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 17, 0, offsetof(tqd_values, workspace) },
+    { TQD_CURRENT_LIMIT, TQD_FLOAT, 4, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 18, 0, offsetof(tqd_values, current_limit) },
+    { TQD_HEAT_LIMIT, TQD_FLOAT, 4, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 19, 0, offsetof(tqd_values, heat_limit) },
+    { TQD_TENSION_RANGE, TQD_FLOAT, 4, 2, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 20, 0, offsetof(tqd_values, tension_range) },
+    { TQD_CONTACT_FORCE, TQD_FLOAT, 4, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 21, 0, offsetof(tqd_values, contact_force) },
     { TQD_STIFFNESS_LIMIT, TQD_FLOAT, 4, 1, TQD_READS, 0, 0, offsetof(tqd_values, stiffness_limit) },
-    { TQD_VIBRATION_LIMIT, TQD_FLOAT, 4, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 20, 0, offsetof(tqd_values, vibration_limit) },
+    { TQD_VIBRATION_LIMIT, TQD_FLOAT, 4, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 22, 0, offsetof(tqd_values, vibration_limit) },
+    { TQD_SPEED_DELAY, TQD_INTEGER, 1, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 23, 0, offsetof(tqd_values, speed_delay) },
     { TQD_POSITION, TQD_FLOAT, 4, 2, TQD_READS, 0, 0, offsetof(tqd_values, position) },
     { TQD_DEPTH, TQD_FLOAT, 4, 1, TQD_READS, 0, 0, offsetof(tqd_values, depth) },
     { TQD_SPEED, TQD_FLOAT, 4, 1, TQD_READS, 0, 0, offsetof(tqd_values, speed) },
@@ -299,6 +323,11 @@ static const tqd_register tqd_registers[] = {
     { TQD_HEAT, TQD_FLOAT, 4, 2, TQD_READS, 0, 0, offsetof(tqd_values, heat) },
     { TQD_VIBRATION, TQD_FLOAT, 4, 1, TQD_READS, 0, 0, offsetof(tqd_values, vibration) },
     { TQD_BUTTON, TQD_INTEGER, 1, 1, TQD_READS, 0, 0, offsetof(tqd_values, button) },
+    { TQD_VIBRATION_SCALE, TQD_FLOAT, 4, 1, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 24, 0, offsetof(tqd_values, vibration_scale) },
+    { TQD_VIBRATION_RANGE, TQD_FLOAT, 4, 1, TQD_READS, 0, 0, offsetof(tqd_values, vibration_range) },
+    { TQD_WEIGHTING, TQD_FLOAT, 4, 20, TQD_READS | TQD_WRITES | TQD_IDLE_ONLY, 25, 0, offsetof(tqd_values, weighting) },
+    { TQD_PLAYED, TQD_INTEGER, 8, 6, TQD_READS, 0, 0, offsetof(tqd_values, played) },
+    { TQD_CORRECTIONS, TQD_INTEGER, 8, 7, TQD_READS, 0, 0, offsetof(tqd_values, corrections) },
     { TQD_TICK, TQD_INTEGER, 4, 1, TQD_READS, 0, 0, offsetof(tqd_values, tick) },
     { TQD_HEARD_TICK, TQD_INTEGER, 4, 1, TQD_READS, 0, 0, offsetof(tqd_values, heard_tick) },
     { TQD_FAULT_TICK, TQD_INTEGER, 4, 1, TQD_READS, 0, 0, offsetof(tqd_values, fault_tick) },
@@ -313,12 +342,12 @@ static const tqd_register tqd_registers[] = {
     { TQD_SHUTDOWN_ERROR, TQD_INTEGER, 1, 1, TQD_READS, 0, 0, offsetof(tqd_values, shutdown_error) },
     { TQD_TICKS_LATE, TQD_INTEGER, 4, 1, TQD_READS, 0, 0, offsetof(tqd_values, ticks_late) },
     { TQD_TICK_CLOCKS, TQD_INTEGER, 4, 2, TQD_READS, 0, 0, offsetof(tqd_values, tick_clocks) },
-    { TQD_SIMULATE, TQD_INTEGER, 1, 1, TQD_WRITES, 21, 0, offsetof(tqd_values, simulate) },
-    { TQD_STROKE, TQD_FLOAT, 4, 3, TQD_READS | TQD_WRITES, 22, 1, offsetof(tqd_values, stroke) },
+    { TQD_SIMULATE, TQD_INTEGER, 1, 1, TQD_WRITES, 26, 0, offsetof(tqd_values, simulate) },
+    { TQD_STROKE, TQD_FLOAT, 4, 3, TQD_READS | TQD_WRITES, 27, 1, offsetof(tqd_values, stroke) },
     { TQD_SIMULATED, TQD_INTEGER, 1, 1, TQD_READS, 0, 0, offsetof(tqd_values, simulated) },
     { TQD_HOMED, TQD_INTEGER, 1, 1, TQD_READS, 0, 0, offsetof(tqd_values, homed) },
 };
 
-enum { TQD_REGISTERS = 55 };
+enum { TQD_REGISTERS = 63 };
 
 #endif

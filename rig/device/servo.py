@@ -13,14 +13,17 @@ from contextlib import suppress
 
 from modeling.errors import InputError
 from rig.device.definition import DEVICE
+from rig.device.messages import DeviceAnswer, DeviceRequest
 from rig.device.registers import DeviceCommand, DeviceFlags, DeviceStatus
-from rig.force.serving import serve_servo
+from rig.device.rendering import DevicePlayer
+from rig.force.serving import ServedServo, serve_servo
 from rig.force.settings import ForceSettings
 from rig.force.states import Ask, Cause, State
 from rig.force.words import ServoWords
-from rig.hand.messages import Firmware, HandFault, Ready
+from rig.hand.messages import Firmware, Ready
 from rig.live.driven import Parent
 from rig.live.memory import BEYOND, BUTTON, CONTACT, FORCE_COMMANDED, SIMULATED, Live, now_s
+from rig.live.messages import Done
 from rig.wire.conversation import Block, DeviceRefused
 from rig.wire.link import Link
 from rig.wire.transports import opened_transport
@@ -29,7 +32,6 @@ RECORDS_HZ = 1000
 TICK_S = 1 / 5000
 TURN_S = 0.001
 LOOK_S = 0.01  # between looks at the device's state
-AGAIN_S = 0.5  # between attempts to open a device that is gone
 _ASKED = {
     Ask.ARM: DeviceCommand.ARM,
     Ask.SHOW: DeviceCommand.SHOW,
@@ -47,28 +49,18 @@ _FLAGS = {
 
 def main() -> None:
     """Pass on what is asked and read until the parent is gone."""
-    serve_servo(
-        lambda parent, live, wanted, gone: DeviceServo(parent, live, wanted.settings, gone).run(
-            patient=wanted.patient
-        )
-    )
+    serve_servo(DeviceServo)
 
 
-class DeviceServo:
-    """The device between shared memory and wire.
+class DeviceServo(ServedServo):
+    """The device between shared memory and wire; parameters as `ServedServo`."""
 
-    Parameters
-    ----------
-    parent : Parent
-        Is told what the device is, and of faults.
-    gone : threading.Event
-        Set once the parent is gone.
-    """
+    requests = DeviceRequest | Done
 
     def __init__(
         self, parent: Parent, live: Live, settings: ForceSettings, gone: threading.Event
     ) -> None:
-        self._parent, self._live, self._settings, self._gone = parent, live, settings, gone
+        super().__init__(parent, live, settings, gone)
         self._words = ServoWords(live)
         self._link = Link(lambda: opened_transport(settings.address, settings.baud), DEVICE)
         self._state, self._cause = State.BOOT, Cause.NONE
@@ -76,7 +68,15 @@ class DeviceServo:
         self._beat_s = self._looked_s = self._played_s = self._reading_s = 0.0
         self._blocks = 0
         self._ready = False
-        self._told = ""
+        self._player = None
+        if settings.vibration is not None:
+            self._player = DevicePlayer(self._link, live, settings.vibration)
+
+    def answer(self, request: DeviceRequest) -> DeviceAnswer:
+        """Have the device play, or say what it played."""
+        if self._player is None:
+            return DeviceAnswer(number=request.number, sentence="the device plays nothing here.")
+        return self._player.answer(request)
 
     def run(self, *, patient: bool) -> None:
         """Until the parent is gone; waits for a device that is not there where it is patient."""
@@ -103,6 +103,8 @@ class DeviceServo:
         if not self._link.connected:
             self._report(State.FAULT, Cause.LINK)
             self._write_gone()
+            if self._player is not None:
+                self._player.gone()
         else:
             try:
                 if not self._ready:
@@ -136,6 +138,11 @@ class DeviceServo:
         link.write("PowerLimit", settings.most_w)
         link.write("SpeedLimit", settings.most_mm_s)
         link.write("ContactForce", settings.contact_n)
+        link.write("FrozenTime", settings.frozen_s)
+        link.write("ReleaseTime", settings.release_s)
+        link.write("SpeedDelay", round(1e3 * settings.delay_s))
+        if self._player is not None:
+            self._player.prepare()
         link.write("EventRate", RECORDS_HZ)
         assert link.hello is not None
         version = ".".join(map(str, link.hello.firmware_version))
@@ -182,13 +189,24 @@ class DeviceServo:
             self._see(Cause.SOUND)
 
     def _look(self, time_s: float) -> None:
-        if time_s - self._looked_s >= LOOK_S:
-            self._looked_s = time_s
-            self._see()
+        if time_s - self._looked_s < LOOK_S:
+            return
+        self._looked_s = time_s
+        self._see()
+        if self._player is not None:
+            reading = self._live.latest()
+            self._player.look(
+                speed_mm_s=0.0 if reading is None else float(reading["speed_mm_s"]),
+                force_n=0.0 if reading is None else float(reading["force_n"]),
+                heartbeat_s=self._words.heartbeat_s,
+            )
 
     def _see(self, because: Cause | None = None) -> None:
         """Report the device's state; `because` stands for its own cause, which was to stop."""
-        state, cause = State(self._number("State")), Cause(self._number("Cause"))
+        state = State(self._number("State"))
+        cause = self._cause
+        if state != self._state or state in (State.RELEASING, State.FAULT):
+            cause = Cause(self._number("Cause"))
         if because is None and cause == Cause.STOPPED and self._cause == Cause.SOUND:
             because = Cause.SOUND
         self._report(state, cause if because is None else because)
@@ -233,16 +251,6 @@ class DeviceServo:
                 while now_s() < end_s and self._number("State") == State.RELEASING:
                     time.sleep(TURN_S)
             self._link.write("EventRate", 0)
-
-    def _tell(self, sentence: str) -> None:
-        if sentence != self._told:
-            self._told = sentence
-            self._parent.send(HandFault(sentence))
-
-    def _wait(self) -> None:
-        until_s = now_s() + AGAIN_S
-        while now_s() < until_s and not self._gone.wait(0.02):
-            self._write_gone()
 
     def _write_gone(self) -> None:
         self._words.write_gone(simulated=self._simulated)

@@ -15,7 +15,7 @@
 typedef struct {
     tq_number x_mm, z_mm, vx_mm_s, vz_mm_s, share;
     tq_number cosine, sine; /* of the stroke's phase */
-    tq_number current_a[TQ_MOTORS];
+    tq_number current_a[TQ_MOTORS], converted;
     uint16_t counts[TQ_MOTORS], offset[TQ_MOTORS];
     int stuck, flipped, unplugged, motor_fails;
 } tq_simulated;
@@ -27,7 +27,7 @@ static inline void tq_simulated_start(tq_simulated *s, uint16_t offset)
     s->offset[0] = s->offset[1] = offset;
 }
 
-/* What a motor is told. */
+/* What a motor, or the vibrator's converter, is told. */
 static inline int tq_simulated_write(tq_simulated *s, int output, tq_number value)
 {
     if (output == TQ_LEFT && s->motor_fails) {
@@ -36,6 +36,8 @@ static inline int tq_simulated_write(tq_simulated *s, int output, tq_number valu
     }
     if (output < TQ_MOTORS)
         s->current_a[output] = value;
+    else
+        s->converted = value;
     return 0;
 }
 

@@ -62,7 +62,7 @@ static inline void tq_virtual_start(tq_virtual *v, uint32_t entropy, uint32_t ba
     board.context = v, board.write = tq_virtual_write, board.room = tq_virtual_room;
     board.send = tq_virtual_send, board.lock = board.unlock = tq_virtual_nothing;
     board.cables = tq_usual_cables();
-    board.entropy = entropy, board.baud = baud, board.simulated = 1;
+    board.entropy = entropy, board.baud = baud, board.simulated = 1, board.most_g = 20;
     tq_simulated_start(&v->simulated, 0);
     tq_device_start(&v->device, &board);
 }
@@ -92,6 +92,12 @@ static inline size_t tq_virtual_take(tq_virtual *v, uint8_t *out, size_t most)
         v->first = (v->first + 1) % TQ_SENT;
     }
     return n;
+}
+
+/* What the vibrator's converter was given last. */
+static inline double tq_virtual_converted(const tq_virtual *v)
+{
+    return (double)v->simulated.converted;
 }
 
 /* Every output off. */

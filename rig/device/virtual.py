@@ -59,6 +59,11 @@ class VirtualBoard:
         """
         return int(self.lib.tq_virtual_run(self.address, port, end, other))
 
+    @property
+    def converted(self) -> float:
+        """What the vibrator's converter was given last."""
+        return float(self.lib.tq_virtual_converted(self.address))
+
     def shut(self) -> None:
         """Every output off."""
         self.lib.tq_virtual_shut(self.address)

@@ -38,6 +38,8 @@ class ForceHand(HandReader):
     force : ForceSettings
     """
 
+    process = "rig.force.process"  # of the servo
+
     def __init__(self, live: Live, settings: HandSettings, force: ForceSettings) -> None:
         force.check_late()
         super().__init__(live, settings)
@@ -150,8 +152,7 @@ class ForceHand(HandReader):
 
     def _start(self, *, patient: bool) -> Child:
         settings = RunServo(live=str(self._live.path), settings=self._force, patient=patient)
-        process = "rig.device.servo" if self._force.address else "rig.force.process"
-        self._child = child = Child(process, settings)
+        self._child = child = Child(self.process, settings)
         if self._watchdog is not None:
             with suppress(ChildLost):
                 self._watchdog.send(Servo(child.pid))

@@ -15,7 +15,7 @@ from typing import Any
 from modeling.errors import InputError
 from rig.force.dhd import DhdLibrary
 from rig.force.realtime import SERVO_PRIORITY, real_time
-from rig.force.serving import serve_servo
+from rig.force.serving import ServedServo, serve_servo
 from rig.force.settings import (
     JUMP_MM,
     MISSED_S,
@@ -23,30 +23,22 @@ from rig.force.settings import (
     VELOCITY_HZ,
     ForceSettings,
 )
-from rig.hand.messages import HandFault, Ready
+from rig.hand.messages import Ready
 from rig.live.driven import Parent
 from rig.live.memory import GONE, HEARTBEAT_S, SIMULATED, Live, compiled, now_s
-
-AGAIN_S = 0.5  # between attempts to open a device that is gone
-_BEAT_S = 0.02
 
 
 def main() -> None:
     """Run the servo until the parent is gone."""
-    serve_servo(
-        lambda parent, live, wanted, gone: _Servo(parent, live, wanted.settings, gone).run(
-            patient=wanted.patient
-        )
-    )
+    serve_servo(_Servo)
 
 
-class _Servo:
+class _Servo(ServedServo):
     def __init__(
         self, parent: Parent, live: Live, settings: ForceSettings, gone: threading.Event
     ) -> None:
-        self._parent, self._live, self._settings, self._gone = parent, live, settings, gone
+        super().__init__(parent, live, settings, gone)
         self._library = DhdLibrary(settings.library)
-        self._told = ""
 
     def run(self, *, patient: bool) -> None:
         """Run with a device, and with it again where it was lost; never armed anew by itself."""
@@ -82,17 +74,6 @@ class _Servo:
             gc.freeze()
             if not self._gone.is_set():
                 compiled().lib.tq_servo_run(servo)
-
-    def _tell(self, sentence: str) -> None:
-        if sentence != self._told:
-            self._told = sentence
-            self._parent.send(HandFault(sentence))
-
-    def _wait(self) -> None:
-        """Until the next attempt; the readings go on, and say that there is no device."""
-        until_s = now_s() + AGAIN_S
-        while now_s() < until_s and not self._gone.wait(_BEAT_S):
-            self._write_gone()
 
     def _write_gone(self) -> None:
         flags = GONE | (SIMULATED if self._settings.simulated else 0)

@@ -3,39 +3,85 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from abc import ABC, abstractmethod
 from contextlib import suppress
+from typing import Any
 
 from rig.force.control import Control
 from rig.force.messages import RunServo
 from rig.force.realtime import outlive_signals
+from rig.force.settings import ForceSettings
 from rig.force.states import Ask
+from rig.hand.messages import HandFault
 from rig.live.driven import Parent
-from rig.live.memory import Live
-from rig.live.messages import Done
+from rig.live.memory import Live, now_s
+from rig.live.messages import Done, Message
+
+AGAIN_S = 0.5  # between attempts to open a device that is gone
+_BEAT_S = 0.02
 
 
-def serve_servo(run: Callable[[Parent, Live, RunServo, threading.Event], None]) -> None:
-    """Run a servo until the parent is gone; then it is asked to stop.
+class ServedServo(ABC):
+    """A servo, and what its process does for it.
 
     Parameters
     ----------
-    run : callable
-        Returns once the event is set and there is no force.
+    parent : Parent
+        Is told what the device is, and of faults.
+    gone : threading.Event
+        Set once the parent is gone.
     """
+
+    requests: Any = Done  # what the parent may ask for; a union
+
+    def __init__(
+        self, parent: Parent, live: Live, settings: ForceSettings, gone: threading.Event
+    ) -> None:
+        self._parent, self._live, self._settings, self._gone = parent, live, settings, gone
+        self._told = ""
+
+    @abstractmethod
+    def run(self, *, patient: bool) -> None:
+        """Until the parent is gone and there is no force; waits for a device where patient."""
+
+    @abstractmethod
+    def _write_gone(self) -> None:
+        """Write a reading that says that there is no device."""
+
+    def answer(self, request: Any) -> Message:
+        """Do what the parent asks for, in a thread of its own."""
+        assert isinstance(request, Done)
+        return request
+
+    def _tell(self, sentence: str) -> None:
+        """Report a fault, unless it was the last one."""
+        if sentence != self._told:
+            self._told = sentence
+            self._parent.send(HandFault(sentence))
+
+    def _wait(self) -> None:
+        """Until the next attempt; the readings go on, and say that there is no device."""
+        until_s = now_s() + AGAIN_S
+        while now_s() < until_s and not self._gone.wait(_BEAT_S):
+            self._write_gone()
+
+
+def serve_servo(kind: type[ServedServo]) -> None:
+    """Run a servo of this kind until the parent is gone; then it is asked to stop."""
     with Parent() as parent:
         outlive_signals()
         wanted = parent.settings(RunServo)
         with Live.attach(wanted.live) as live:
             gone = threading.Event()
-            threading.Thread(target=_listen, args=(parent, live, gone), daemon=True).start()
-            run(parent, live, wanted, gone)
+            servo = kind(parent, live, wanted.settings, gone)
+            threading.Thread(target=_listen, args=(parent, live, gone, servo), daemon=True).start()
+            servo.run(patient=wanted.patient)
 
 
-def _listen(parent: Parent, live: Live, gone: threading.Event) -> None:
-    """Have the servo stop once the parent is gone."""
+def _listen(parent: Parent, live: Live, gone: threading.Event, servo: ServedServo) -> None:
+    """Answer the parent, and have the servo stop once it is gone."""
     with suppress(OSError):
-        parent.serve(Done, lambda done: done)
+        parent.serve(servo.requests, servo.answer)
     gone.set()
     with suppress(TypeError):  # the memory is released already
         Control(live).ask(Ask.STOP, within_s=0)

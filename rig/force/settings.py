@@ -24,6 +24,28 @@ class Pose:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Vibration:
+    """How a device that renders by itself vibrates.
+
+    Parameters
+    ----------
+    peak_g : float
+        Largest acceleration.
+    scale : float
+        What its converter is given for 1 g.
+    weighting : bytes
+        Of exposure: sections of five numbers (float64).
+    seed : int
+        Of the noise.
+    """
+
+    peak_g: float
+    scale: float
+    weighting: bytes
+    seed: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
 class ForceSettings:
     """What the servo of a force device is started with; ranges are those of [force] in a rig file.
 
@@ -41,6 +63,8 @@ class ForceSettings:
         A wall is released where nothing was played for so long; 0 where nothing plays.
     watched : bool
         Whether a watchdog has to look on.
+    vibration : Vibration, optional
+        Of a device that renders the texture, too.
     """
 
     library: str | None = None
@@ -64,6 +88,7 @@ class ForceSettings:
     sound_s: float = 0.0
     watched: bool = True
     simulated: bool = False
+    vibration: Vibration | None = None
 
     def check_late(self) -> None:
         """Refuse a limit that the watchdog would be faster than.

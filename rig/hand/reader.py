@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from contextlib import suppress
-from typing import Self
+from typing import Any, Self
 
 from modeling.errors import InputError
 from rig.hand.following import Follower
@@ -15,6 +15,7 @@ from rig.hand.tracking import REST_S
 from rig.hand.window import WindowHand
 from rig.live.child import Child, ChildLost
 from rig.live.memory import Live, now_s
+from rig.live.messages import Done
 
 START_S = 30.0
 FIRMWARE_S = 1.0  # a serial sensor states its firmware twice as often
@@ -34,6 +35,8 @@ class HandReader:
     settings : HandSettings
         Kind "window" has no process: the owner of the window calls `push`.
     """
+
+    reports: Any = Report  # what its process says by itself
 
     def __init__(self, live: Live, settings: HandSettings) -> None:
         self._live = live
@@ -179,7 +182,7 @@ class HandReader:
         """Note what it reports; ChildLost at its end."""
         while True:
             try:
-                report: Report = child.hear(Report)
+                report = child.hear(self.reports)
             except InputError as refusal:
                 report = HandFault(str(refusal))
             self._alive_s = min(self._alive_s, now_s())
@@ -191,6 +194,13 @@ class HandReader:
                 case Firmware(version):
                     self._firmware = version
                     self._has_firmware.set()
+                case Ready() | Done():
+                    pass
+                case _:
+                    self._take(report)
+
+    def _take(self, report: Any) -> None:
+        """Note what only a process of this kind reports."""
 
     def _watch(self) -> None:
         """Kill a process that writes no readings; `_keep` replaces it."""

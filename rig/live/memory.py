@@ -195,6 +195,11 @@ class Live:
             self.address, time_s, x_mm, y_mm, depth_mm, speed_mm_s, force_n, flags
         )
 
+    def write_block(self, row: np.void) -> None:
+        """Add a block (BLOCK) that was played; only one process may."""
+        rows = np.array([row], dtype=BLOCK)
+        self._lib.tq_write_block(self.address, self._ffi.from_buffer("tq_block *", rows))
+
     def heartbeat(self) -> None:
         """Write the session's heartbeat, without which playback falls silent.
 

@@ -122,6 +122,31 @@ class DeviceSection(FileSection):
     simulated: Annotated[
         bool, key("whether it is emulated (tactileq rig device --emulate); refused where it lies")
     ] = False
+    renders: Annotated[
+        bool,
+        key("whether it renders [the texture](device.md#texture), too; else the sound card does"),
+    ] = False
+    volts_per_g: (
+        Annotated[
+            Figure,
+            key(
+                "voltage at the vibrator where the firmware's converter is given 1 g, amplifier "
+                "included; required where it renders",
+                unit="V/g",
+                ge=1e-6,
+                le=1000,
+            ),
+        ]
+        | None
+    ) = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.renders and self.volts_per_g is None:
+            raise InputError(
+                "expected device.volts_per_g (V/g) of a device that renders the texture, got none; "
+                "measure the voltage at the vibrator, and add it under [device]."
+            )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -41,6 +41,7 @@ from rig.setup.sections import (
 )
 
 DEVICE_RATE_HZ = 5000.0  # of the control loop of [device]
+DEVICE_BLOCK_S = 0.01  # between looks at what it has played
 SHIPPED_RIG_FILE = Path(__file__).with_name("desk_rig.toml")
 
 
@@ -111,6 +112,12 @@ class RigFile(DescribedFile):
             raise InputError(
                 f"expected force.rate_hz = {DEVICE_RATE_HZ:g} beside [device], got "
                 f"{force.rate_hz:g}; its control loop has no other rate."
+            )
+        delay_ms = 1e3 * self.hand.filter_delay_s.value
+        if not (0.5 <= delay_ms < 32.5):
+            raise InputError(
+                f"expected hand.filter_delay_s of 1 to 32 ms beside [device], got {delay_ms:g} ms; "
+                "its filter has no other delay."
             )
 
     @classmethod
@@ -199,8 +206,37 @@ class RigFile(DescribedFile):
 
     @property
     def fullscale_per_g(self) -> float:
-        """What the card has to put out, as a share of full scale, for 1 g at the held pen."""
-        return 1 / (self.sound.fullscale_v.value * self.vibrator.g_per_volt.value)
+        """What the converter has to put out for 1 g at the held pen.
+
+        As a share of full scale; of a device that renders the texture in its own unit.
+        """
+        return 1 / (self.output_v.value * self.vibrator.g_per_volt.value)
+
+    @property
+    def renderer(self) -> DeviceSection | None:
+        """[device] where it renders the texture; None where the sound card does."""
+        device = self.own_device
+        return device if device is not None and device.renders else None
+
+    @property
+    def output_v(self) -> Figure:
+        """Voltage at the vibrator where the converter puts out 1."""
+        device = self.renderer
+        if device is None or device.volts_per_g is None:
+            return self.sound.fullscale_v
+        return device.volts_per_g
+
+    @property
+    def output_rate_hz(self) -> float:
+        """Of the samples that drive the vibrator."""
+        return self.sound.rate_hz if self.renderer is None else DEVICE_RATE_HZ
+
+    @property
+    def output_block_s(self) -> float:
+        """Between two rows of the log of what was played."""
+        if self.renderer is not None:
+            return DEVICE_BLOCK_S
+        return self.sound.block / self.sound.rate_hz
 
     @property
     def safe_limits(self) -> Limits:

@@ -91,6 +91,17 @@ class Block:
     values: np.ndarray[Any, np.dtype[Any]]
 
 
+def upload_bodies(data: bytes, digest: int) -> list[bytes]:
+    """What is sent one after another to upload a model with this hash."""
+    begin, end = struct.pack("<BI", 0, len(data)), struct.pack("<BQ", 2, digest)
+    parts = range(0, len(data), _MOST_DATA)
+    return [
+        begin,
+        *(struct.pack("<BI", 1, at) + data[at : at + _MOST_DATA] for at in parts),
+        end,
+    ]
+
+
 class Conversation:
     """A device at the other end of a transport.
 
@@ -186,19 +197,19 @@ class Conversation:
         DeviceRefused
             If it is too large, or no model to this device.
         """
-        begin, what = struct.pack("<BI", 0, len(data)), "to take a model"
+        for body in upload_bodies(data, digest):
+            self.upload_part(body)
+
+    def upload_part(self, body: bytes) -> None:
+        """Send one of `upload_bodies`; see `upload`."""
         end_s = self._transport.now_s() + _BUSY_S
         while True:
             try:
-                self.exchange(Kind.UPLOAD, begin, what)
-                break
+                self.exchange(Kind.UPLOAD, body, "to take a model")
+                return
             except DeviceRefused as refused:
                 if refused.status != _STATUS_BUSY or self._transport.now_s() > end_s:
                     raise
-        for at in range(0, len(data), _MOST_DATA):
-            body = struct.pack("<BI", 1, at) + data[at : at + _MOST_DATA]
-            self.exchange(Kind.UPLOAD, body, what)
-        self.exchange(Kind.UPLOAD, struct.pack("<BQ", 2, digest), what)
 
     def exchange(self, kind: Kind, body: bytes, what: str) -> bytes:
         """Send one frame and wait for its reply; the body without the status.

@@ -10,10 +10,11 @@ from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeout
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Self
 
 from modeling.errors import InputError
-from rig.wire.conversation import Block, Conversation, Hello
+from rig.wire.conversation import Block, Conversation, Hello, upload_bodies
 from rig.wire.definition import Definition, Value
 from rig.wire.transports import Transport, TransportLost
 
@@ -101,8 +102,9 @@ class Link:
         return applied
 
     def upload(self, data: bytes, digest: int, *, within_s: float = UPLOAD_S) -> None:
-        """Send a model; see `Conversation.upload`."""
-        self._ask(lambda talk: talk.upload(data, digest), within_s)
+        """Send a model, other commands in between; see `Conversation.upload`."""
+        for body in upload_bodies(data, digest):
+            self._ask(partial(_upload_part, body), within_s)
 
     def beat(self) -> None:
         """Say that the control loop goes on; where nobody does for a second the device lets go."""
@@ -189,13 +191,13 @@ class Link:
 
     def _step(self, talk: Conversation) -> None:
         now_s = talk.now_s()
+        if self._beats != self._beaten and now_s - self._beat_s >= BEAT_S:
+            self._beaten, self._beat_s = self._beats, now_s
+            talk.write("Heartbeat", self._beaten & 0xFFFFFFFF)
         try:
             command = self._commands.get_nowait()
         except queue.Empty:
-            if self._beats != self._beaten and now_s - self._beat_s >= BEAT_S:
-                self._beaten, self._beat_s = self._beats, now_s
-                talk.write("Heartbeat", self._beaten & 0xFFFFFFFF)
-            elif now_s - talk.exchanged_s >= KEEP_S:
+            if now_s - talk.exchanged_s >= KEEP_S:
                 talk.read("State")
             else:
                 talk.listen(_LISTEN_S)
@@ -219,6 +221,10 @@ class Link:
             with suppress(InputError):
                 return self._connect()
         return None
+
+
+def _upload_part(body: bytes, talk: Conversation) -> None:
+    talk.upload_part(body)
 
 
 def _do(command: _Command, talk: Conversation) -> None:

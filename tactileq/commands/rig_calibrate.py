@@ -16,7 +16,7 @@ from tactileq.options import RigPath, Seed
 if TYPE_CHECKING:
     from rig.calibration.measuring import Accelerometer
     from rig.setup.rig_file import RigFile
-    from rig.sound.output import SoundOutput
+    from rig.sound.vibration import VibrationOutput
 
 What = Literal["floor", "vibrator", "level", "pressure"]
 
@@ -180,7 +180,7 @@ def _grams(*, enough: bool) -> float:
 
 
 @contextmanager
-def _bench(rig: RigFile) -> Iterator[tuple[SoundOutput, Accelerometer]]:
+def _bench(rig: RigFile) -> Iterator[tuple[VibrationOutput, Accelerometer]]:
     """Sound and accelerometer, open."""
     from rig.calibration.measuring import Accelerometer
     from rig.calibration.opening import accelerometer_input, opened_sound

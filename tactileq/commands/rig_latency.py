@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from modeling.errors import counted
+from modeling.errors import InputError, counted
 from tactileq.options import RigPath, Seed
 from tactileq.printing import share_of
 
@@ -53,6 +53,12 @@ def rig_latency(
     from rig.setup.rig_file import RigFile
 
     loaded = RigFile.load(rig)
+    if loaded.renderer is not None:
+        raise InputError(
+            f"expected a rig whose sound card plays the texture, got [device] in {rig}, which "
+            "renders it; measure from its encoders to the accelerometer with an oscilloscope, and "
+            "write [latency] yourself."
+        )
     rms_g = usual_rms_g(loaded.safe_limits) if level_g is None else level_g
     with TemporaryDirectory() as folder:
         seen, latencies, loop_s = _measured(

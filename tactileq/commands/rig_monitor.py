@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rig.monitoring.bare_thread import WakeUps
     from rig.monitoring.figures import Range, Snapshot
     from rig.setup.rig_file import RigFile
-    from rig.sound.output import SoundOutput
+    from rig.sound.vibration import VibrationOutput
 
 _EVERY_S = 0.1
 
@@ -64,11 +64,11 @@ def _watch(rig: RigFile, model: AnyModel | None, seconds: float | None) -> None:
     from rig.monitoring.bare_thread import Look, WakeUps
     from rig.monitoring.figures import Monitor
 
-    rate_hz, period_s = rig.sound.rate_hz, rig.sound.block / rig.sound.rate_hz
+    rate_hz, period_s = rig.output_rate_hz, rig.output_block_s
     with (
         Live.create() as live,
         hand_reader(rig, live) as hand,
-        opened_sound(rig, live) as sound,
+        opened_sound(rig, live, hand=hand) as sound,
     ):
         monitor = Monitor(live, rate_hz=rate_hz, peak_g=rig.limits.peak_g.value, grid=_grid(model))
         bare = Child("rig.monitoring.bare_thread", period_s)
@@ -99,7 +99,7 @@ def _watch(rig: RigFile, model: AnyModel | None, seconds: float | None) -> None:
     print(_summary(snapshot, missed, time.monotonic() - start, limited=limited))
 
 
-def _play_on(sound: SoundOutput, model: AnyModel | None, faults: Sequence[str]) -> None:
+def _play_on(sound: VibrationOutput, model: AnyModel | None, faults: Sequence[str]) -> None:
     """Play again by another process where the one before was lost.
 
     Raises

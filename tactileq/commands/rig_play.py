@@ -79,7 +79,7 @@ def chosen_signal(
             "give one."
         )
     if tone_hz is not None:
-        return tone_burst(tone_hz, amplitude_g, duration_s=duration_s, rate_hz=rig.sound.rate_hz)
+        return tone_burst(tone_hz, amplitude_g, duration_s=duration_s, rate_hz=rig.output_rate_hz)
     assert stimuli is not None
     assert which is not None
     signal = stimulus(stimuli, which)
@@ -90,13 +90,13 @@ def chosen_signal(
 def play(rig: RigFile, signal: PreparedSignal, *, times: int) -> None:
     """Play a signal `times` times in succession."""
     from rig.desk.lock import rig_locked
-    from rig.desk.parts import sound_output
+    from rig.desk.parts import vibration_output
     from rig.live.memory import Live
     from tactileq.printing import progress
 
     compensated = signal.vibrator_sha256 is not None
     with rig_locked(rig.rig.name), Live.create() as live:
-        sound = sound_output(rig, live)
+        sound = vibration_output(rig, live)
         sound.checked(signal.samples_g, compensated=compensated)  # before anything is opened
         with sound, progress("Playing", times) as advance:
             for _ in range(times):

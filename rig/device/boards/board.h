@@ -10,7 +10,8 @@
 /* --- To be written ------------------------------------------------------------------------------- */
 
 /* Clocks, pins, motors off, the UART with its interrupt, a timer with another one 5000 times a second,
-   whose priority is the lower one. Fills in cables, baud and entropy. */
+   whose priority is the lower one. Fills in cables, baud, most_g and
+   entropy. */
 void board_begin(tq_board *board);
 /* A motor's current (A) or the vibrator's acceleration (g); not 0 where a driver reports a fault. */
 int board_write(int output, tq_number value);

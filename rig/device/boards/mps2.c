@@ -41,7 +41,7 @@ static void byte_left(void)
 
 void board_begin(tq_board *board)
 {
-    board->baud = BAUD, board->entropy = start_number();
+    board->baud = BAUD, board->entropy = start_number(), board->most_g = 20;
     UART_DIVISOR = HZ / BAUD;
     UART_CONTROL = 15; /* both ways, with an interrupt each */
     INTERRUPTS_ON(0);

@@ -30,7 +30,7 @@ enum { STATE = 0x00, DATA = 0x04, DIVISOR = 0x08, CONTROL = 0x0C };
 enum { CAME = 1u << 5, EMPTY = 1u << 7 }; /* in the UART's state; in its control they ask for an interrupt */
 
 #define AMPERES_AT_FULL ((tq_number)6) /* of the motor driver at the whole PWM: set it for yours */
-#define STEPS_PER_G ((tq_number)200)   /* of the DAC: tactileq rig calibrate measures it */
+#define STEPS_PER_G ((tq_number)200)   /* of the DAC; VibrationScale corrects it */
 
 /* Until a bit is set; not for ever, since an emulator may not know it. */
 static void wait_for(volatile uint32_t *where, uint32_t bit)
@@ -136,6 +136,7 @@ void board_begin(tq_board *board)
     INTERRUPTS_ON(UART_IRQ);
     begin_ticks(HZ);
     board->baud = BAUD, board->entropy = start_number();
+    board->most_g = 2047 / (float)STEPS_PER_G;
 #ifndef TQ_SIMULATED /* which QEMU does not know */
     board->entropy ^= UNIQUE_ID;
 #endif

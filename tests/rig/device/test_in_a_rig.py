@@ -129,7 +129,7 @@ def test_a_desk_rig_shows_its_wall_under_a_texture(
         rig_on = device_rig(tmp_path, device.address)
         with DeskRig(rig_on, override="a test") as rig:
             assert rig.simulated
-            assert str(rig.stated["HandFirmware"]).startswith("tactileq-cables 1.0")
+            assert str(rig.stated["HandFirmware"]).startswith("tactileq-cables 1.1")
             rig.arm()
             rig.present_model(planted_texture("PVC"))
             end_s = time.monotonic() + 2.0

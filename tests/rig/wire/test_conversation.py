@@ -97,6 +97,11 @@ def answering(answer: Callable[[bytes], bytes]) -> Iterator[str]:
         os.close(ours)
 
 
+PACKED = 256 * DEVICE.firmware_version[0] + DEVICE.firmware_version[1]
+VERSION = ".".join(map(str, DEVICE.firmware_version))
+HASH = f"{DEVICE.schema_hash:016x}"
+
+
 def hello_of(who: int, version: int, schema: int) -> Callable[[bytes], bytes]:
     """A device that says this of itself."""
     reader = WireReader()
@@ -112,9 +117,15 @@ def hello_of(who: int, version: int, schema: int) -> Callable[[bytes], bytes]:
 @pytest.mark.parametrize(
     ("answer", "facts"),
     [
-        (hello_of(1, 256, DEVICE.schema_hash), {"got": "kind 1"}),
-        (hello_of(29012, 512, DEVICE.schema_hash), {"expected": "1.0", "got": "2.0"}),
-        (hello_of(29012, 256, 77), {"expected": f"{DEVICE.schema_hash:016x}", "got": f"{77:016x}"}),
+        (hello_of(1, PACKED, DEVICE.schema_hash), {"got": "kind 1"}),
+        (
+            hello_of(29012, 512, DEVICE.schema_hash),
+            {"expected": VERSION, "got": "2.0"},
+        ),
+        (
+            hello_of(29012, PACKED, 77),
+            {"expected": HASH, "got": f"{77:016x}"},
+        ),
         (lambda _: b"$P,0,1000000,12500,-300,1500,1*64A5\n", {"got": "bytes that are no frames"}),
         (lambda _: b"\0\1\2\0\3\0", {"got": "bytes that are no frames"}),
         (lambda _: b"", {"got": "nothing"}),

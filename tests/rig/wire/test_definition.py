@@ -80,7 +80,7 @@ def test_what_both_must_agree_on_changes_the_hash(tmp_path: Path) -> None:
         changed("registers", "ForceLimit", "range", to=[0.1, 21]),
         changed("registers", "ForceLimit", "unit", to="kN"),
         changed("groupMasks", "Command", "values", "ARM", to=7),
-        changed("firmwareVersion", to="1.1"),
+        changed("firmwareVersion", to="9.9"),
     ):
         assert loaded(tmp_path, values).schema_hash != DEVICE.schema_hash
 
