@@ -160,7 +160,7 @@ def device_binding() -> FFI:
     builder = FFI()
     builder.cdef("typedef struct tq_virtual tq_virtual;")
     public = r"^static (?:inline )?(\w[^;{}=]*?tq_virtual_(?:%s)\([^)]*\))(?=\s*\{)"
-    names = "size|start|receive|step|take|shut|run"
+    names = "size|start|receive|step|take|converted|shut|run"
     found = re.findall(public % names, header.read_text("utf-8"), re.MULTILINE)
     builder.cdef("\n".join(f"{call};" for call in dict.fromkeys(found)))
     folders = [DEVICE, FORCE.parent, KERNEL.parent]

@@ -5,6 +5,7 @@ The device is emulated, so everything here is simulated.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ import pytest
 from experiments.sessions.log import read_log
 from experiments.verification.verifying import verify_data
 from rig.device.emulating import Emulator
+from stimuli.planted.textures import planted_texture
 from tests.end_to_end.test_force_rig import press_down
 from tests.end_to_end.test_session_on_a_rig import (
     STUDY,
@@ -24,6 +26,7 @@ from tests.end_to_end.test_session_on_a_rig import (
     study,  # noqa: F401 (a fixture)
 )
 from tests.rig.device.test_in_a_rig import device_rig
+from tests.rig.device.test_renders_in_a_rig import rendering_rig
 
 WALL = """
 [wall]
@@ -55,18 +58,16 @@ def test_the_check_and_the_question_say_what_is_there(
     assert "expected a serial port" in " ".join(done.stdout.split())
 
 
-def test_a_session_runs_on_it_unchanged(
+def test_a_session_runs_on_it_without_a_sound_card(
     main: Any,
     study: Path,  # noqa: F811
     device: Emulator,
-    jack_server: Any,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    device_rig(study, device.address)
+    rendering_rig(study, device.address)
     (study / "study.toml").write_text(STUDY + WALL)
     sit_down(monkeypatch, Unlucky(dict.fromkeys(range(1, 5), press_down)))
-    with jack_server(block=128):
-        done = main("session", *WORDS, "--rig", "rig.toml")
+    done = main("session", *WORDS, "--rig", "rig.toml")
     assert done.returncode == 0, done.stderr
     stem = study / "data/sourcedata/sub-01/ses-01/sub-01_ses-01_task-absolute"
     hand = pd.read_csv(f"{stem}_hand.tsv", sep="\t")
@@ -74,6 +75,27 @@ def test_a_session_runs_on_it_unchanged(
     assert len(on_wall) > 300
     assert (on_wall["force_commanded"] == 1).all()
     assert (on_wall["force_n"] / on_wall["depth_mm"]).quantile(0.9) == pytest.approx(0.8, rel=0.05)
+    played = pd.read_csv(f"{stem}_presentations.tsv", sep="\t")
+    virtual = played[played["surface"] == "virtual"]
+    shown_s = virtual["end_s"] - virtual["start_s"]
+    assert (virtual["played_s"] - shown_s).abs().max() < 0.15
+    assert virtual["dose_g2_s"].max() > 0
+    assert (virtual["stale_blocks"] == 0).all()
     events = read_log(Path(f"{stem}_log.jsonl")).events
-    assert any(event["event"] == "exposure" for event in events)
+    assert sum(event.get("weighted_g2_s", 0) for event in events) > 0
     assert verify_data(study / "data").differences == ()
+
+
+def test_it_is_watched_and_played_by_commands(main: Any, tmp_path: Path, device: Emulator) -> None:
+    rendering_rig(tmp_path, device.address)
+    said = " ".join(main("rig", "check").stdout.split())
+    assert "the device renders the texture" in said
+    played = main("rig", "play", "--rig", "rig.toml", "--tone", "200", "--duration", "0.3")
+    assert played.returncode == 0, played.stderr
+    planted_texture("canvas").save(tmp_path / "canvas.json")
+    watched = main("rig", "monitor", "canvas.json", "--seconds", "1")
+    assert watched.returncode == 0, watched.stderr
+    assert re.search(r"of \d\d+ blocks missed", watched.stdout)
+    refused = main("rig", "latency")
+    assert refused.returncode == 1
+    assert "expected a rig whose sound card plays" in " ".join(refused.stderr.split())

@@ -70,6 +70,10 @@ class Talk(Conversation):
         """Records of so long, at every tick."""
         self.write("Source", source)
         self.write("EventRate", TICK_HZ)
+        return self.listened(seconds)
+
+    def listened(self, seconds: float) -> list[Block]:
+        """The records of so long more."""
         blocks, end_s, step_s = [], self.now_s() + seconds, 0.004
         while self.now_s() < end_s:
             self.write("Heartbeat", 1)
