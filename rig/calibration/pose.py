@@ -37,8 +37,9 @@ def touching_hand(rig: RigFile, live: Live) -> ForceHand:
     settings = force_settings(rig, sounds=False)
     if rig.own_device is not None:
         raise InputError(
-            f"expected a force device with a frame of its own, got [device] in {rig.path}, whose "
-            "wall lies where its firmware says; measure the surface by hand."
+            f"expected a force device that can press, got [device] in {rig.path}, whose cables "
+            "only pull and whose wall lies where its firmware says; measure with a spring balance, "
+            "and write real_surface.stiffness yourself."
         )
     if settings is None:
         raise InputError(
