@@ -170,7 +170,13 @@ RIG = Kind(
                 "high_mm": [50, 60, 70],
                 "homed_on": DAY,
             },
-            "device": {"address": "/dev/ttyACM0", "baud": 500_000, "simulated": True},
+            "device": {
+                "address": "/dev/ttyACM0",
+                "baud": 500_000,
+                "simulated": True,
+                "renders": True,
+                "volts_per_g": figure(1, "V/g"),
+            },
             "pose": {
                 "origin_mm": [1.5, 0, -2],
                 "x": [0, 1, 0],

@@ -18,6 +18,7 @@ from modeling import InputError
 from rig.desk.desk_rig import DeskRig
 from rig.desk.walls import largest_of
 from rig.device.emulating import Emulator
+from rig.device.hand import DeviceHand
 from rig.device.registers import DeviceCause, DeviceState
 from rig.force.hand import ForceHand
 from rig.force.settings import ForceSettings
@@ -57,7 +58,7 @@ def device() -> Iterator[Emulator]:
 @contextmanager
 def opened(address: str) -> Iterator[tuple[Live, ForceHand]]:
     settings = ForceSettings(address=address, rate_hz=5000, watched=False, simulated=True)
-    with Live.create() as live, ForceHand(live, HandSettings(kind="force"), settings) as hand:
+    with Live.create() as live, DeviceHand(live, HandSettings(kind="force"), settings) as hand:
         yield live, hand
 
 
@@ -174,6 +175,6 @@ def test_an_emulated_device_that_is_not_declared_is_refused(device: Emulator) ->
     with (
         Live.create() as live,
         refused(InputError, expected="a board with a hand", got="an emulated one"),
-        ForceHand(live, HandSettings(kind="force"), replace(settings, simulated=False)),
+        DeviceHand(live, HandSettings(kind="force"), replace(settings, simulated=False)),
     ):
         pass
