@@ -19,8 +19,9 @@ from rig.monitoring.bare_thread import Look, WakeUps
 REPEATS = 2
 PERIOD_S = 128 / 48000  # a block of the audio server, which is as short of time
 ANSWER_S = 60.0
-ROOMS = ("hand", "live", "monitoring", "capture", "desk", "force", "wire", "device")
-LIVE = tuple(f"tests/rig/{room}/" for room in ROOMS)
+ROOMS = ("hand/", "live/", "monitoring/", "capture/", "desk/", "force/", "wire/test_link")
+DEVICE = ("device/test_emulated", "device/test_in_a_rig", "device/test_renders")  # others: virtual
+LIVE = tuple(f"tests/rig/{place}" for place in (*ROOMS, *DEVICE))
 
 
 class BareProcess:

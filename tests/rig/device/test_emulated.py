@@ -8,8 +8,9 @@ import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ import pytest
 from benches.rendering.rivals import layered_texture
 from modeling import InputError
 from rig.device.definition import DEVICE
-from rig.device.emulating import KINDS, Emulator, Kind, check_baud
+from rig.device.emulating import KINDS, Emulator, Kind, build_firmware, check_baud
 from rig.device.models import device_model
 from rig.device.registers import DeviceCommand, DeviceSource, DeviceState
 from rig.wire.conversation import Conversation
@@ -35,11 +36,25 @@ FAST = 4_000_000  # carries a record at every tick
 BAND = 0.2  # for other versions of the compiler
 
 
+class BuiltEmulator(Emulator):
+    """Its firmware was compiled before, by one worker for all."""
+
+    def __init__(self, kind: Kind, once_per_run: Callable[..., Any]) -> None:
+        super().__init__(kind, baud=FAST if kind == "stm32" else None)
+        self._once = once_per_run
+
+    def _built(self) -> Path:
+        def build(folder: Path) -> Path:
+            return build_firmware(self._kind, folder / "firmware.elf", baud=self._baud)
+
+        return Path(self._once(f"firmware-{self._kind}", build))
+
+
 @pytest.fixture(scope="module", params=KINDS)
-def device(request: pytest.FixtureRequest) -> Iterator[Emulator]:
+def device(request: pytest.FixtureRequest, once_per_run: Callable[..., Any]) -> Iterator[Emulator]:
     if request.param != "process" and not HAS_QEMU:
         pytest.skip("qemu-system-arm and arm-none-eabi-gcc are not installed")
-    with Emulator(request.param, baud=FAST if request.param == "stm32" else None) as emulator:
+    with BuiltEmulator(request.param, once_per_run) as emulator:
         yield emulator
 
 

@@ -65,9 +65,9 @@ def test_textures_and_tones_are_played_and_accounted_for(tmp_path: Path, device:
     with opened(tmp_path, device.address) as rig:
         rig.arm()
         rig.present_model(planted_texture("canvas"))
-        polled(rig, 1.5)
+        polled(rig, 0.9)
         rig.present_model(planted_texture("MDF"))
-        polled(rig, 1.0)
+        polled(rig, 0.6)
         rig.silence()
         rig.present_signal(ToneBurst(frequency_hz=200.0, amplitude_g=0.2, duration_s=0.5))
         polled(rig, 0.6)
@@ -77,7 +77,7 @@ def test_textures_and_tones_are_played_and_accounted_for(tmp_path: Path, device:
         canvas, mdf, burst = rig.take_presentations()
     assert faults == []
     assert np.nanmax(rows.force_n[rows.presentation == canvas.number]) > 0.2
-    for one, seconds in ((canvas, 1.5), (mdf, 1.0)):
+    for one, seconds in ((canvas, 0.9), (mdf, 0.6)):
         assert one.played_s == pytest.approx(seconds, abs=0.3)
         assert one.peak_g > 0.01
         assert 0 < one.weighted_dose_g2_s < one.dose_g2_s

@@ -9,10 +9,11 @@ import json
 import re
 import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
-from filelock import FileLock
 
 from rig.wire.envelope import WireFrame
 from tests.rig.device.compiled import ROOT, compiled_walks
@@ -21,13 +22,9 @@ pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not 
 
 
 @pytest.fixture(scope="session")
-def walks(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
+def walks(once_per_run: Callable[..., Any]) -> Path:
     """Compiled once for all workers."""
-    folder = tmp_path_factory.getbasetemp()
-    folder = folder if worker_id == "master" else folder.parent
-    with FileLock(folder / "walks.lock"):
-        program = folder / "walks"
-        return program if program.exists() else compiled_walks(folder)
+    return Path(once_per_run("walks", compiled_walks))
 
 
 def told(program: Path, *arguments: object) -> dict[str, float]:
