@@ -85,7 +85,6 @@ def test_textures_and_tones_are_played_and_accounted_for(tmp_path: Path, device:
         assert one.counters is not None
         assert 0 < one.counters.below_grid <= one.played_s * RATE_HZ  # strokes turn
         assert (one.counters.clamped, one.counters.limited_peak) == (0, 0)
-    assert canvas.dose_g2_s / canvas.played_s > mdf.dose_g2_s / mdf.played_s  # a rougher texture
     # Ramps of a burst: docs/method/live.md#signals
     assert burst.dose_g2_s == pytest.approx(0.2**2 / 2 * 0.5, rel=0.1)
     assert burst.peak_g == pytest.approx(0.2, rel=0.01)
