@@ -152,7 +152,7 @@ PRESENTATION_COLUMNS = (
             ("dose_g2_s", "g²·s", "Its square over time, unweighted"),
             ("rms_g", "g", "Its RMS"),
             ("peak_g", "g", "Its largest absolute value"),
-            ("misses", "", "Blocks that the sound card missed"),
+            ("misses", "", "Blocks that the sound card, or the device that renders, missed"),
             ("stale_blocks", "", "Blocks for which the hand was not read in time"),
         )
     ),

@@ -16,6 +16,7 @@ from rig.device.definition import DEVICE
 from rig.device.messages import DeviceAnswer, DeviceRequest
 from rig.device.registers import DeviceCommand, DeviceFlags, DeviceStatus
 from rig.device.rendering import DevicePlayer
+from rig.force.realtime import SERVO_PRIORITY, real_time
 from rig.force.serving import ServedServo, serve_servo
 from rig.force.settings import ForceSettings
 from rig.force.states import Ask, Cause, State
@@ -67,7 +68,7 @@ class DeviceServo(ServedServo):
         self._simulated = settings.simulated
         self._beat_s = self._looked_s = self._played_s = self._reading_s = 0.0
         self._blocks = 0
-        self._ready = False
+        self._ready = self._real_time = False
         self._player = None
         if settings.vibration is not None:
             self._player = DevicePlayer(self._link, live, settings.vibration)
@@ -80,6 +81,7 @@ class DeviceServo(ServedServo):
 
     def run(self, *, patient: bool) -> None:
         """Until the parent is gone; waits for a device that is not there where it is patient."""
+        self._real_time = real_time(SERVO_PRIORITY)  # its threads inherit it
         while not self._gone.is_set():
             try:
                 with self._link:
@@ -147,6 +149,7 @@ class DeviceServo(ServedServo):
         assert link.hello is not None
         version = ".".join(map(str, link.hello.firmware_version))
         name = f"{DEVICE.name} at {settings.address}" + ", simulated" * self._simulated
+        name += f", {'real-time' if self._real_time else 'ordinary'} priority"
         self._ready, self._told = True, ""
         self._parent.send(Ready(name))
         self._parent.send(Firmware(f"{DEVICE.name} {version}"))

@@ -5,12 +5,11 @@ docs/method/confusions.md#similarity-choice
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import stats
+from scipy import special, stats
 
 from analysis.chapters.confusions.information import check_counts
 from modeling import InputError
@@ -18,6 +17,9 @@ from modeling.arrays import Floats
 
 FEWEST_CLASSES, MOST_CLASSES = 3, 16
 SIMULATIONS = 199
+# Of Newton's method: steps at most, the longest one, a curvature in all directions, and the largest
+# change of a fitted count at which it ends.
+MOST_STEPS, LONGEST_STEP, SLIGHT, CONVERGED = 60, 2.0, 1e-9, 1e-10
 # Cochran's rule for χ²: no expected count below 1, at most a fifth below 5.
 LEAST_EXPECTED, USUAL_EXPECTED, MOST_BELOW = 1.0, 5.0, 0.2
 
@@ -33,8 +35,7 @@ class SimilarityChoice:
     biases : (k,) ndarray
         Adding up to 1; NaN as above, and where nothing was confused.
     deviance : float
-        Of the fitted counts; NaN where no class was left to compare, or the counts are too few for
-        a fit.
+        Of the fitted counts; NaN where no class was left to compare.
     df : int
         (k−1)(k−2)/2, less one for each pair that was never confused.
     p : float
@@ -81,12 +82,9 @@ def similarity_choice(counts: ArrayLike, *, rng: np.random.Generator) -> Similar
     if known.size < 2:
         return SimilarityChoice(similarities, biases, float("nan"), 0, float("nan"), float("nan"))
     kept = table[np.ix_(known, known)]
-    try:
-        fitted, logs = _fit(kept)
-    except ValueError:  # of statsmodels, where a parameter runs away
-        return SimilarityChoice(similarities, biases, float("nan"), 0, float("nan"), float("nan"))
-    deviance, df = _deviance(kept, fitted), _degrees(kept)
-    similarities[np.ix_(known, known)] = logs
+    (fitted,) = _fitted(kept[None])
+    deviance, df = float(_deviances(kept[None], fitted[None])[0]), _degrees(kept)
+    similarities[np.ix_(known, known)] = _similarities(fitted)
     biases[known] = _biases(fitted)
     return SimilarityChoice(
         similarities,
@@ -98,38 +96,39 @@ def similarity_choice(counts: ArrayLike, *, rng: np.random.Generator) -> Similar
     )
 
 
-def _fit(table: Floats) -> tuple[Floats, Floats]:
-    """Fitted counts and similarities of a table whose diagonal holds no 0."""
-    import statsmodels.api as sm  # late: it takes a second to import
+def _fitted(tables: Floats) -> Floats:
+    """Fitted counts of tables (s, k, k) side by side.
 
-    k = len(table)
-    rows, columns = np.indices((k, k)).reshape(2, -1)
+    The model is quasi-symmetry: its fit keeps the diagonal and the sum of each pair of opposite
+    cells, and shares that sum out as Bradley and Terry do (Agresti, Categorical Data Analysis,
+    section 11.2), log μᵢⱼ/μⱼᵢ = θⱼ − θᵢ. Newton's method; where a parameter runs away the counts
+    converge all the same.
+    """
+    k = tables.shape[-1]
     first, second = np.triu_indices(k, 1)
-    confused = table[first, second] + table[second, first] > 0
-    if not confused.any():
-        return table, np.eye(k)
-    pair = np.full((k, k), -1)
-    pair[first[confused], second[confused]] = np.arange(confused.sum())
-    pair = np.maximum(pair, pair.T).ravel()
-    design = np.concatenate(
-        [
-            np.eye(k)[rows],
-            np.eye(k)[columns][:, 1:],  # the first column is the reference
-            np.eye(int(confused.sum()))[np.maximum(pair, 0)] * (pair >= 0)[:, None],
-        ],
-        axis=1,
-    )
-    kept = (rows == columns) | (pair >= 0)  # pairs that were never confused are fitted by 0
-    with warnings.catch_warnings():
-        # Few counts may be fitted exactly, or by several parameters alike: the fitted counts, which
-        # alone are used, are the same.
-        warnings.simplefilter("ignore")
-        result = sm.GLM(table.ravel()[kept], design[kept], family=sm.families.Poisson()).fit()
-    flat = np.zeros(k * k)
-    flat[kept] = result.fittedvalues
-    fitted = flat.reshape(k, k)
+    there, back = tables[:, first, second], tables[:, second, first]
+    totals = there + back
+    design = np.eye(k)[second] - np.eye(k)[first]
+    theta = np.zeros((len(tables), k))
+    for _ in range(MOST_STEPS):
+        shares = special.expit(theta @ design.T)
+        slope = (there - totals * shares) @ design
+        weights = totals * shares * (1 - shares)
+        curve = np.einsum("sp,pi,pj->sij", weights, design, design)
+        # Only differences count, and of classes that nothing joins none does.
+        step = np.linalg.solve(curve + 1 / k + SLIGHT * np.eye(k), slope[..., None])[..., 0]
+        theta += np.clip(step, -LONGEST_STEP, LONGEST_STEP)
+        if np.abs(weights @ np.abs(design) * step).max(initial=0.0) < CONVERGED:
+            break
+    shares = special.expit(theta @ design.T)
+    fitted = tables * np.eye(k)
+    fitted[:, first, second], fitted[:, second, first] = totals * shares, totals * (1 - shares)
+    return fitted
+
+
+def _similarities(fitted: Floats) -> Floats:
     diagonal = np.diag(fitted)
-    return fitted, np.sqrt(fitted * fitted.T / np.outer(diagonal, diagonal))
+    return np.sqrt(fitted * fitted.T / np.outer(diagonal, diagonal))
 
 
 def _biases(fitted: Floats) -> Floats:
@@ -147,10 +146,10 @@ def _biases(fitted: Floats) -> Floats:
     return result
 
 
-def _deviance(table: Floats, fitted: Floats) -> float:
-    counted = table > 0
-    logs = np.log(table[counted] / fitted[counted])
-    return float(2 * (table[counted] @ logs - (table - fitted).sum()))
+def _deviances(tables: Floats, fitted: Floats) -> Floats:
+    """Of tables (s, k, k), whose totals are those of the fitted ones; (s,)."""
+    result: Floats = 2 * special.xlogy(tables, tables / np.where(tables > 0, fitted, 1)).sum((1, 2))
+    return result
 
 
 def _degrees(table: Floats) -> int:
@@ -172,13 +171,8 @@ def _simulated_p(
     """Share of drawn tables that the model fits no better, the table itself among them."""
     totals = table.sum(axis=1).astype(int)
     shares = fitted / fitted.sum(axis=1, keepdims=True)
-    worse = 1
-    for _ in range(SIMULATIONS):
-        drawn = rng.multinomial(totals, shares).astype(float)
-        known = np.flatnonzero(np.diag(drawn) > 0)
-        drawn = drawn[np.ix_(known, known)]
-        try:
-            worse += len(known) > 1 and _deviance(drawn, _fit(drawn)[0]) >= deviance - 1e-9
-        except ValueError:
-            worse += 1  # counted against the difference
-    return worse / (SIMULATIONS + 1)
+    drawn = np.array([rng.multinomial(totals, shares) for _ in range(SIMULATIONS)], dtype=float)
+    known = np.einsum("sii->si", drawn) > 0
+    drawn *= known[:, :, None] & known[:, None, :]
+    worse = _deviances(drawn, _fitted(drawn)) >= deviance - 1e-9
+    return float(1 + (worse & (known.sum(axis=1) > 1)).sum()) / (SIMULATIONS + 1)

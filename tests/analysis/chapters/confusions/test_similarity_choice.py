@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import statsmodels.api as sm
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
@@ -110,3 +111,26 @@ def test_all_right_leaves_nothing_to_test():
 def test_other_tables_are_refused(wrong, expected, got):
     with refused(InputError, expected=expected, got=got):
         similarity_choice(wrong, rng=rng())
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_fit_is_that_of_a_poisson_regression(seed: int) -> None:
+    """Of statsmodels: answers ~ row + column + pair, the diagonal without a pair of its own."""
+    k = 3 + seed
+    _, _, shares = planted(k, seed)
+    table = np.random.default_rng(seed).multinomial(np.full(k, 300), shares)
+    rows, columns = np.indices((k, k)).reshape(2, -1)
+    pairs = [(i, j) for i in range(k) for j in range(i + 1, k)]
+    apart = [
+        [{row, column} == {i, j} for i, j in pairs]
+        for row, column in zip(rows, columns, strict=True)
+    ]
+    design = np.column_stack([np.eye(k)[rows], np.eye(k)[columns][:, 1:], np.array(apart, float)])
+    model = sm.GLM(table.ravel(), design, family=sm.families.Poisson()).fit(tol=1e-13)
+    fitted = model.fittedvalues.reshape(k, k)
+    diagonal = np.diag(fitted)
+    found = similarity_choice(table, rng=rng())
+    assert found.deviance == pytest.approx(model.deviance, rel=1e-8)
+    assert found.df == model.df_resid
+    alike = np.sqrt(fitted * fitted.T / np.outer(diagonal, diagonal))
+    assert_allclose(found.similarities, alike, rtol=1e-8)
