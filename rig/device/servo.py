@@ -24,7 +24,6 @@ from rig.force.words import ServoWords
 from rig.hand.messages import Firmware, Ready
 from rig.live.driven import Parent
 from rig.live.memory import BEYOND, BUTTON, CONTACT, FORCE_COMMANDED, SIMULATED, Live, now_s
-from rig.live.messages import Done
 from rig.wire.conversation import Block, DeviceRefused
 from rig.wire.link import Link
 from rig.wire.transports import opened_transport
@@ -56,7 +55,7 @@ def main() -> None:
 class DeviceServo(ServedServo):
     """The device between shared memory and wire; parameters as `ServedServo`."""
 
-    requests = DeviceRequest | Done
+    requests = DeviceRequest
 
     def __init__(
         self, parent: Parent, live: Live, settings: ForceSettings, gone: threading.Event
