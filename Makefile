@@ -36,7 +36,7 @@ install: .venv/installed
 	@touch $@
 
 # The project itself and its C parts; reports a missing compiler.
-.venv/installed: .venv/packages pyproject.toml setup.py tools/c_parts.py modeling/estimation/slopes.h modeling/rendering/kernel.h modeling/rendering/lattice.h modeling/rendering/many.h modeling/rendering/many_lanes.h modeling/rendering/call.c modeling/rendering/player.h rig/live/live.h rig/live/sound.h benches/rendering/rivals.h benches/rendering/sounds.h
+.venv/installed: .venv/packages pyproject.toml setup.py tools/c_parts.py modeling/estimation/slopes.h modeling/rendering/kernel.h modeling/rendering/lattice.h modeling/rendering/many.h modeling/rendering/many_lanes.h modeling/rendering/call.c modeling/rendering/player.h modeling/rendering/weigh.h rig/live/live.h rig/live/sound.h benches/rendering/rivals.h benches/rendering/sounds.h
 	@$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@$(BIN)/python -c "from modeling.rendering.compiled import is_compiled; is_compiled()"
 	@$(COMPILE) modeling stimuli rig experiments analysis benches tactileq

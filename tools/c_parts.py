@@ -24,6 +24,7 @@ SLOPES = ROOT / "modeling" / "estimation" / "slopes.h"
 RIVALS = ROOT / "benches" / "rendering" / "rivals.h"
 SOUNDS = ROOT / "benches" / "rendering" / "sounds.h"
 PLAYER = ROOT / "modeling" / "rendering" / "player.h"
+WEIGH = ROOT / "modeling" / "rendering" / "weigh.h"
 LIVE = ROOT / "rig" / "live" / "live.h"
 SOUND = ROOT / "rig" / "live" / "sound.h"
 BACKEND = ROOT / "rig" / "force" / "backend.h"
@@ -122,7 +123,7 @@ def live_binding() -> FFI:
             )
         )
     )
-    headers = (KERNEL, LATTICE, PLAYER, LIVE, SOUND, BACKEND, DHD, FORCE, STROKE, SERVO)
+    headers = (KERNEL, LATTICE, PLAYER, WEIGH, LIVE, SOUND, BACKEND, DHD, FORCE, STROKE, SERVO)
     builder.set_source(
         "rig.live._live",
         f'#include "{SOUND.name}"\n#include "{SERVO.name}"',
@@ -155,7 +156,7 @@ def standin_binding() -> FFI:
 def device_binding() -> FFI:
     """The builder of `rig.device._device`: the firmware on a simulated board."""
     header = DEVICE / "virtual.h"
-    inner = ("backend.h", "force.h", "kernel.h", "scene.h")
+    inner = ("backend.h", "force.h", "kernel.h", "scene.h", "weigh.h")
     others = ("cables.h", "device.h", "model.h", "registers.h", "simulated.h", "wire.h")
     builder = FFI()
     builder.cdef("typedef struct tq_virtual tq_virtual;")

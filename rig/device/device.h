@@ -14,6 +14,7 @@
 #include "force.h"
 #include "model.h"
 #include "registers.h"
+#include "weigh.h"
 #include "wire.h"
 
 #define TQ_TICK_HZ 5000
@@ -26,7 +27,6 @@ enum {
     TQ_RECORDS = 64, TQ_PER_FRAME = 10, TQ_RECORD_BYTES = 21, TQ_EVENT_HEADER = 11,
     TQ_SAMPLES = 1024, TQ_MOST_QUEUED = 1000,
     TQ_TAPS = 64,                        /* of the tracking filter at most: twice its delay in ms */
-    TQ_WEIGHTS = 4,                      /* sections of the weighting of exposure */
     TQ_OUTPUTS = 3, TQ_VIBRATOR = 2
 };
 
@@ -94,8 +94,9 @@ typedef struct {
     uint32_t read_tick; /* readings so far */
     tq_number vibration_g;
     /* Sums over what was played: the samples since the last reading, and what is below 1e-6 g². */
-    float recent_g[TQ_READ_TICKS], peak_g, square_left, weighted_left, weighted[TQ_WEIGHTS][2];
-    int recent, sections;
+    float recent_g[TQ_READ_TICKS], peak_g, square_left, weighted_left;
+    tq_weighting weighting;
+    int recent;
     uint32_t missed; /* before this source */
     /* Records, from the tick to the main loop. */
     tq_record records[TQ_RECORDS];
@@ -384,30 +385,12 @@ static inline float tq_device_host_sample(tq_device *d)
     return 0.9f * d->values.vibration; /* a step to 0 would be felt */
 }
 
-/* A sample after the weighting of exposure (transposed direct form II). */
-static inline float tq_device_weigh(tq_device *d, float x)
-{
-    int n;
-    for (n = 0; n < d->sections; n++) {
-        const float *c = d->values.weighting + 5 * n;
-        float *state = d->weighted[n], y = c[0] * x + state[0];
-        state[0] = c[1] * x - c[3] * y + state[1];
-        state[1] = c[2] * x - c[4] * y;
-        if (state[0] < 1e-20f && state[0] > -1e-20f) /* no numbers that are slow to compute with */
-            state[0] = 0;
-        if (state[1] < 1e-20f && state[1] > -1e-20f)
-            state[1] = 0;
-        x = y;
-    }
-    return d->sections ? x : 0;
-}
-
 /* Adds a rest and a sum to a whole number of 1e-6 g²; what is less stays for the next time. */
 static inline void tq_device_add(uint64_t *sum, float *left, float square)
 {
     uint32_t whole;
-    *left += square;
-    whole = (uint32_t)(*left * 1e6f); /* of five samples at most 2e9 */
+    *left += square < 4000 ? square : 4000; /* of five samples at most 2000 but with an odd weighting */
+    whole = (uint32_t)(*left * 1e6f);
     *sum += whole, *left -= (float)whole * 1e-6f;
 }
 
@@ -417,7 +400,7 @@ static inline void tq_device_sum(tq_device *d)
     float square = 0, weighted = 0;
     int n;
     for (n = 0; n < d->recent; n++) {
-        float x = d->recent_g[n], y = tq_device_weigh(d, x), size = x < 0 ? -x : x;
+        float x = d->recent_g[n], y = (float)tq_weigh(&d->weighting, x), size = x < 0 ? -x : x;
         square += x * x, weighted += y * y;
         d->values.played[0] += x != 0 || d->values.source != TQD_SOURCE_NOTHING;
         if (size > d->peak_g)
@@ -648,6 +631,17 @@ static inline int tq_device_sections(const uint8_t *value)
     return count;
 }
 
+/* A weighting from its beginning. */
+static inline void tq_device_weighting(tq_device *d, const uint8_t *value)
+{
+    tq_weighting *w = &d->weighting;
+    int n;
+    memset(w, 0, sizeof *w);
+    w->count = tq_device_sections(value);
+    for (n = 0; n < 5 * TQ_WEIGHTS; n++)
+        w->section[n / 5][n % 5] = d->values.weighting[n];
+}
+
 /* What a value must be beside its range. */
 static inline int tq_device_accepts(const tq_device *d, uint8_t address, const uint8_t *value)
 {
@@ -718,8 +712,7 @@ static inline int tq_device_apply(tq_device *d, const tqd_register *r, const uin
         }
         break;
     case TQD_WEIGHTING:
-        d->sections = tq_device_sections(value);
-        memset(d->weighted, 0, sizeof d->weighted);
+        tq_device_weighting(d, value);
         break;
     case TQD_SPEED_DELAY:
         tq_device_track(d);

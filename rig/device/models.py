@@ -13,13 +13,16 @@ from modeling.models.loading import AnyModel
 from modeling.rendering.limits import Limits
 from modeling.rendering.plan import Notch, plan_for
 from rig.device.definition import DEVICE
+from rig.setup.rig_file import DEVICE_RATE_HZ
 from rig.wire.conversation import Hello
 
 MOST_LAYERS = 8
 CAPACITY_REALS = 2048
 # What the device needs: no limit of a model may be infinite.
 DEVICE_LIMITS = Limits(peak=5.0, rms=2.0, duration_s=60.0, pause_s=0.1)
-ANY_DEVICE = Hello(DEVICE.who_am_i, DEVICE.firmware_version, DEVICE.schema_hash, 5000.0, 8, 0)
+ANY_DEVICE = Hello(
+    DEVICE.who_am_i, DEVICE.firmware_version, DEVICE.schema_hash, DEVICE_RATE_HZ, 8, 0
+)
 _HEAD = struct.Struct("<4s4B3I4x")
 _SCALARS = (
     "model_rate_hz",

@@ -124,8 +124,7 @@ class DevicePlayer:
         with self._lock:
             if presentation != self._presentation or not self._is_model:
                 return None
-            counts = zip(self._corrections(), self._before, strict=True)
-            since = (now - before for now, before in counts)
+            since = np.subtract(self._corrections(), self._before).tolist()
             return RenderCounters(**dict(zip(_COUNTERS, since, strict=True)))
 
     def _corrections(self) -> list[int]:

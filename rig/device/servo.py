@@ -24,12 +24,12 @@ from rig.force.words import ServoWords
 from rig.hand.messages import Firmware, Ready
 from rig.live.driven import Parent
 from rig.live.memory import BEYOND, BUTTON, CONTACT, FORCE_COMMANDED, SIMULATED, Live, now_s
+from rig.setup.rig_file import DEVICE_RATE_HZ
 from rig.wire.conversation import Block, DeviceRefused
 from rig.wire.link import Link
 from rig.wire.transports import opened_transport
 
 RECORDS_HZ = 1000
-TICK_S = 1 / 5000
 TURN_S = 0.001
 LOOK_S = 0.01  # between looks at the device's state
 _ASKED = {
@@ -78,23 +78,13 @@ class DeviceServo(ServedServo):
             return DeviceAnswer(number=request.number, sentence="the device plays nothing here.")
         return self._player.answer(request)
 
-    def run(self, *, patient: bool) -> None:
-        """Until the parent is gone; waits for a device that is not there where it is patient."""
-        self._real_time = real_time(SERVO_PRIORITY)  # its threads inherit it
-        while not self._gone.is_set():
-            try:
-                with self._link:
-                    self._ready = False
-                    while not self._gone.is_set():
-                        self._turn()
-                    self._let_go()
-            except InputError as error:
-                if not patient:
-                    raise
-                self._tell(str(error))
-                self._wait()
-            patient = True
-        self._write_gone()
+    def _run_once(self) -> None:
+        self._real_time = real_time(SERVO_PRIORITY)  # the thread of the link inherits it
+        with self._link:
+            self._ready = False
+            while not self._gone.is_set():
+                self._turn()
+            self._let_go()
 
     def _turn(self) -> None:
         began_s = now_s()
@@ -228,7 +218,7 @@ class DeviceServo(ServedServo):
         for n, block in enumerate(blocks):
             later = sum(one.values.size for one in blocks[n + 1 :])
             for k, row in enumerate(block.values):
-                age_s = (later + block.values.size - 1 - k) * block.every * TICK_S
+                age_s = (later + block.values.size - 1 - k) * block.every / DEVICE_RATE_HZ
                 flags = FORCE_COMMANDED | sum(
                     mine for theirs, mine in _FLAGS.items() if int(row["flags"]) & theirs
                 )

@@ -120,23 +120,23 @@ class DeviceSound(VibrationOutput):
         """See `VibrationOutput`; InputError as `device_model`."""
         number = self._number()
 
-        def ask() -> None:
-            board = replace(ANY_DEVICE, real_size=self._hand.ask(Describe()).real_size)
-            upload = device_model(
-                model, board, limits=self._limits, compensation=self._compensation
-            )
-            self._hand.ask(PlayModel(presentation=number, data=upload.data, digest=upload.hash))
-
-        return self._begin(number, ask)
+        real_size = self._lost(lambda: self._hand.ask(Describe())).real_size
+        upload = device_model(
+            model,
+            replace(ANY_DEVICE, real_size=real_size),
+            limits=self._limits,
+            compensation=self._compensation,
+        )
+        return self._begin(
+            number, PlayModel(presentation=number, data=upload.data, digest=upload.hash)
+        )
 
     def _begin_signal(self, number: int, samples: Floats) -> Presented:
         data = samples.astype(np.float32).tobytes()
-        return self._begin(
-            number, lambda: self._hand.ask(PlaySamples(presentation=number, samples=data))
-        )
+        return self._begin(number, PlaySamples(presentation=number, samples=data))
 
-    def _begin(self, number: int, ask: Callable[[], Any]) -> Presented:
-        self._lost(ask)
+    def _begin(self, number: int, wanted: PlayModel | PlaySamples) -> Presented:
+        self._lost(lambda: self._hand.ask(wanted))
         self._plays = True
         row = self._lost(lambda: self._wait(lambda rows: rows["presentation"] == number))
         return Presented(presentation=number, time_s=float(row["dac_time_s"]))
@@ -180,10 +180,7 @@ class DeviceSound(VibrationOutput):
             faults += self._masking.faults()
         return tuple(faults)
 
-    def _look(self) -> None:
-        self._looked()
-
-    def _looked(self) -> Rows:
+    def _look(self) -> Rows:
         rows, halts = self._played.look()
         self._faults += [HALTED] * halts
         return rows
@@ -192,7 +189,7 @@ class DeviceSound(VibrationOutput):
         """The first new block for which this holds; ChildLost where none comes."""
         end_s = now_s() + within_s
         while now_s() < end_s:
-            rows = self._looked()
+            rows = self._look()
             fitting = rows[np.asarray(found(rows), dtype=bool)]
             if fitting.size:
                 return fitting[0]  # type: ignore[no-any-return]

@@ -40,23 +40,6 @@ class _Servo(ServedServo):
         super().__init__(parent, live, settings, gone)
         self._library = DhdLibrary(settings.library)
 
-    def run(self, *, patient: bool) -> None:
-        """Run with a device, and with it again where it was lost; never armed anew by itself."""
-        while not self._gone.is_set():
-            try:
-                self._run_once()
-                if not self._gone.is_set():
-                    raise InputError(
-                        "expected the force device to go on, got none; check its cable and power."
-                    )
-            except InputError as error:
-                if not patient:
-                    raise
-                self._tell(str(error))
-                self._wait()
-            patient = True
-        self._write_gone()
-
     def _run_once(self) -> None:
         number = self._library.find(self._settings.serial)
         with self._library.opened(number) as name:
@@ -74,6 +57,10 @@ class _Servo(ServedServo):
             gc.freeze()
             if not self._gone.is_set():
                 compiled().lib.tq_servo_run(servo)
+        if not self._gone.is_set():
+            raise InputError(
+                "expected the force device to go on, got none; check its cable and power."
+            )
 
     def _write_gone(self) -> None:
         flags = GONE | (SIMULATED if self._settings.simulated else 0)

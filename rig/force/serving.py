@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from contextlib import suppress
 from typing import Any
 
+from modeling.errors import InputError
 from rig.force.control import Control
 from rig.force.messages import RunServo
 from rig.force.realtime import outlive_signals
@@ -40,9 +41,25 @@ class ServedServo(ABC):
         self._parent, self._live, self._settings, self._gone = parent, live, settings, gone
         self._told = ""
 
-    @abstractmethod
     def run(self, *, patient: bool) -> None:
-        """Until the parent is gone and there is no force; waits for a device where patient."""
+        """Until the parent is gone and there is no force; never armed anew by itself.
+
+        A device that is not there is waited for where it is patient, and one that is lost always.
+        """
+        while not self._gone.is_set():
+            try:
+                self._run_once()
+            except InputError as error:
+                if not patient:
+                    raise
+                self._tell(str(error))
+                self._wait()
+            patient = True
+        self._write_gone()
+
+    @abstractmethod
+    def _run_once(self) -> None:
+        """With a device until it or the parent is gone; InputError where the device is."""
 
     @abstractmethod
     def _write_gone(self) -> None:

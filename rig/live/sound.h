@@ -18,6 +18,7 @@
 #define TQ_SOUND_H
 
 #include "player.h"
+#include "weigh.h"
 
 #include "live.h"
 
@@ -25,7 +26,6 @@
 #define TQ_FRESH 64      /* readings that a block takes in at most, the latest */
 #define TQ_CLOCK_S 0.1   /* over which the times of blocks are smoothed */
 #define TQ_PAUSE_S 0.05  /* a block so much out of time begins a new sequence of them */
-#define TQ_WEIGHTS 4     /* sections of the weighting of exposure at most */
 #define TQ_UNDERFLOWED 4 /* of PortAudio: paOutputUnderflow */
 
 /* A voice with a number, by which the log knows it. */
@@ -63,8 +63,7 @@ struct tq_sound {
     uint64_t readings; /* how many were written up to that */
     tq_real masking_level;
     uint64_t masking_key, position, signal_samples;
-    double weight[TQ_WEIGHTS][5], weighted[TQ_WEIGHTS][2]; /* b0, b1, b2, a1, a2; their states */
-    int weights;
+    tq_weighting weighting;
 };
 typedef struct tq_sound tq_sound;
 
@@ -94,8 +93,8 @@ static inline void tq_sound_start(tq_sound *s, tq_live *live, double rate_hz, in
    callback is first called; without it nothing is weighted, and the sum is 0. */
 static inline void tq_sound_weigh(tq_sound *s, const double *sections, int count)
 {
-    memcpy(s->weight, sections, (size_t)count * sizeof s->weight[0]);
-    s->weights = count;
+    memcpy(s->weighting.section, sections, (size_t)count * sizeof s->weighting.section[0]);
+    s->weighting.count = count;
 }
 
 /* Prepares a surface that is not in use; see tq_start. */
@@ -279,24 +278,6 @@ TQ_INLINE uint32_t tq_surface_now(tq_sound *s)
     return u ? u->presentation : 0;
 }
 
-/* A sample after the weighting of exposure (transposed direct form II); 0 without one. */
-TQ_INLINE double tq_weigh(tq_sound *s, double x)
-{
-    int n;
-    for (n = 0; n < s->weights; n++) {
-        const double *c = s->weight[n];
-        double *state = s->weighted[n], y = c[0] * x + state[0];
-        state[0] = c[1] * x - c[3] * y + state[1];
-        state[1] = c[2] * x - c[4] * y;
-        if (state[0] < 1e-30 && state[0] > -1e-30) /* no numbers that are slow to compute with */
-            state[0] = 0;
-        if (state[1] < 1e-30 && state[1] > -1e-30)
-            state[1] = 0;
-        x = y;
-    }
-    return s->weights ? x : 0;
-}
-
 /* The next samples, at most a piece; `block` collects what the log says of them. */
 TQ_INLINE void tq_piece_render(tq_sound *s, tq_block *block, float *out, size_t count)
 {
@@ -316,7 +297,7 @@ TQ_INLINE void tq_piece_render(tq_sound *s, tq_block *block, float *out, size_t 
     }
     for (n = 0; n < count; n++) {
         float size = piece[n] < 0 ? -piece[n] : piece[n];
-        double weighted = tq_weigh(s, (double)piece[n]);
+        double weighted = tq_weigh(&s->weighting, (tq_real)piece[n]);
         block->weighted_square_sum_g2 += weighted * weighted;
         block->peak_g = size > block->peak_g ? size : block->peak_g;
         block->square_sum_g2 += (double)piece[n] * (double)piece[n];

@@ -22,7 +22,7 @@ from modeling.vibrators.compensation import Compensation
 from modeling.vibrators.exposure import hand_arm_sections
 from modeling.vibrators.vibrator import Vibrator
 from rig.live.child import ChildLost
-from rig.live.memory import Live
+from rig.live.memory import Live, Rows
 from rig.live.messages import Done
 from rig.sound.messages import (
     Corrected,
@@ -197,8 +197,8 @@ class SoundOutput(VibrationOutput):
         """What went wrong since the last call, one sentence each; a heartbeat for what plays."""
         return self._process.faults()
 
-    def _look(self) -> None:
-        self._process.look()
+    def _look(self) -> Rows:
+        return self._process.look()
 
     # --- What both kinds share --------------------------------------------------------------
 

@@ -18,7 +18,7 @@ from modeling.models.loading import AnyModel
 from modeling.rendering.limits import Limits
 from modeling.rendering.plan import RenderCounters, RenderPlan, plan_for
 from modeling.vibrators.compensation import Compensation
-from rig.live.memory import OLDEST_READING_S, Live, now_s
+from rig.live.memory import OLDEST_READING_S, Live, Rows, now_s
 from rig.sound.played import STALLED_S, PlayedBlocks
 from rig.sound.signal_limits import check_signal, largest_factor
 
@@ -150,7 +150,7 @@ class VibrationOutput(ABC):
         """What went wrong since the last call, one sentence each; a heartbeat for what plays."""
 
     @abstractmethod
-    def _look(self) -> None:
+    def _look(self) -> Rows:
         """Take in the blocks since the last look."""
 
     @abstractmethod

@@ -49,12 +49,6 @@ def device_rig(folder: Path, address: str, *changes: tuple[str, str]) -> RigFile
     return rig_file(folder, *given, *changes)
 
 
-@pytest.fixture
-def device() -> Iterator[Emulator]:
-    with Emulator("process") as emulator:
-        yield emulator
-
-
 @contextmanager
 def opened(address: str) -> Iterator[tuple[Live, ForceHand]]:
     settings = ForceSettings(address=address, rate_hz=5000, watched=False, simulated=True)

@@ -41,12 +41,6 @@ def rendering_rig(folder: Path, address: str, *changes: tuple[str, str]) -> RigF
     return device_rig(folder, address, ("simulated = true\n[force]", RENDERS), *changes)
 
 
-@pytest.fixture
-def device() -> Iterator[Emulator]:
-    with Emulator("process") as emulator:
-        yield emulator
-
-
 @contextmanager
 def opened(folder: Path, address: str) -> Iterator[DeskRig]:
     with DeskRig(rendering_rig(folder, address), override="a test", seed=3) as rig:

@@ -1,0 +1,15 @@
+"""An emulated device of its own for each test."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from rig.device.emulating import Emulator
+
+
+@pytest.fixture
+def device() -> Iterator[Emulator]:
+    with Emulator("process") as emulator:
+        yield emulator
