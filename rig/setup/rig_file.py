@@ -13,6 +13,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import isclose
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
@@ -114,10 +115,10 @@ class RigFile(DescribedFile):
                 f"{force.rate_hz:g}; its control loop has no other rate."
             )
         delay_ms = 1e3 * self.hand.filter_delay_s.value
-        if not (0.5 <= delay_ms < 32.5):
+        if not (0.5 <= delay_ms < 32.5 and isclose(delay_ms, round(delay_ms))):
             raise InputError(
-                f"expected hand.filter_delay_s of 1 to 32 ms beside [device], got {delay_ms:g} ms; "
-                "its filter has no other delay."
+                f"expected hand.filter_delay_s of 1 to 32 whole ms beside [device], got "
+                f"{delay_ms:g} ms; its filter has no other delay."
             )
 
     @classmethod

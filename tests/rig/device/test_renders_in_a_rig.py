@@ -136,6 +136,8 @@ def test_what_a_rig_file_says_of_it_has_to_fit(tmp_path: Path, device: Emulator)
         device_rig(tmp_path, device.address, ("simulated = true\n[force]", no_volts))
     with refused(InputError, expected="hand.filter_delay_s", got="50 ms"):
         rendering_rig(tmp_path, device.address, ('kind = "force"', SLOW))
+    with refused(InputError, expected="whole ms", got="10.4 ms"):  # it would use 10
+        rendering_rig(tmp_path, device.address, ('kind = "force"', SLOW.replace("0.05", "0.0104")))
     weak = ('value = 2.0, unit = "V/g"', 'value = 0.0001, unit = "V/g"')
     weak_rig = rendering_rig(tmp_path, device.address, weak)
     with (
