@@ -3,7 +3,17 @@
 import numpy
 from setuptools import Extension, setup
 
-PARTS = ("kernel", "kernel_single", "many", "slopes", "rivals", "live", "standin", "device")
+PARTS = (
+    "kernel",
+    "kernel_single",
+    "many",
+    "slopes",
+    "rivals",
+    "live",
+    "standin",
+    "device",
+    "recorder",
+)
 
 ABI = "0x030B0000"  # the stable interface as of Python 3.11: one wheel for all later ones
 

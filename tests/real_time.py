@@ -21,7 +21,7 @@ PERIOD_S = 128 / 48000  # a block of the audio server, which is as short of time
 ANSWER_S = 60.0
 ROOMS = ("hand/", "live/", "monitoring/", "capture/", "desk/", "force/", "wire/test_link")
 DEVICE = ("device/test_emulated", "device/test_in_a_rig", "device/test_renders")  # others: virtual
-LIVE = tuple(f"tests/rig/{place}" for place in (*ROOMS, *DEVICE))
+LIVE = tuple(f"tests/rig/{place}" for place in (*ROOMS, *DEVICE, "recorder/test_emulated"))
 
 
 class BareProcess:

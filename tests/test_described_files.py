@@ -19,6 +19,7 @@ from experiments.study.study import Study
 from modeling import InputError, Scene
 from modeling.files.describing import schema
 from modeling.scenes.scene import SceneFile
+from rig.recorder.recorder_file import RecorderFile
 from rig.setup.rig_file import RigFile
 from stimuli.planted.vibrators import planted_vibrator
 from stimuli.sets.recipe import Recipe
@@ -207,6 +208,57 @@ RIG = Kind(
     write=tomlkit.dumps,
     beside={"vibrator.json": planted_vibrator().to_json()},
 )
+RECORDER = Kind(
+    name="recorder.toml",
+    section=RecorderFile,
+    examples=(
+        {
+            "version": 1,
+            "recorder": {
+                "name": "player",
+                "address": "/dev/ttyACM0",
+                "baud": 500_000,
+                "simulated": True,
+            },
+            "sample": {
+                "radius": figure(41, "mm"),
+                "inner": figure(14, "mm"),
+                "outer": figure(59, "mm"),
+                "safety": figure(2, "mm"),
+                "run_in_s": 0.5,
+            },
+            "motors": {
+                "n_m_per_a": figure(0.03, "N·m/A"),
+                "nominal": figure(4, "A"),
+                "most": figure(5, "A"),
+                "heat": figure(50, "A²·s"),
+                "counts": 8192,
+            },
+            "turntable": {
+                "inertia": figure(3e-4, "kg·m²"),
+                "cut_off": figure(50, "rad/s"),
+                "fastest": figure(15, "rad/s"),
+            },
+            "contactor": {
+                "inertia": figure(2e-5, "kg·m²"),
+                "cut_off": figure(300, "rad/s"),
+                "friction": figure(2e-4, "N·m"),
+                "gravity": figure(-0.001, "N·m"),
+                "lever": figure(31, "mm"),
+                "stiffness": figure(4, "N/mm"),
+            },
+            "sensor": {"files": "adcm", "axis": "x", "wait_s": 20.0, "rate_hz": 220704},
+        },
+        {
+            "version": 1,
+            "recorder": {"name": "player", "address": "simulated"},
+            "sensor": {"device": "USB", "channel": 2, "g_per_fullscale": figure(40, "g")},
+        },
+    ),
+    load=RecorderFile.load,
+    write=tomlkit.dumps,
+    beside={},
+)
 _TEXTURES = {"textures": ["canvas", "PVC", "MDF"], "trays": {"canvas": "A", "PVC": "B", "MDF": "C"}}
 _CLAIM = {"name": "alike", "models": ["full", "simplified"], "test": "equivalence"}
 STUDY = Kind(
@@ -305,7 +357,7 @@ STUDY = Kind(
     beside={},
     again=Study.to_tables,
 )
-KINDS = [SCENE, RECIPE, RIG, STUDY, *saved_files.KINDS]
+KINDS = [SCENE, RECIPE, RIG, RECORDER, STUDY, *saved_files.KINDS]
 
 
 def written(kind: Kind, folder: Path, values: dict[str, object] | str) -> Path:

@@ -5,7 +5,8 @@
 spends its time on, `benches.rendering._rivals` is what the bench compares,
 `rig.live._live` is the memory that processes of a rig share, the callback that plays and the servo
 of a force device, `rig.force._standin` a stand-in for the library of its maker,
-`rig.device._device` the firmware on a simulated board.
+`rig.device._device` the firmware on a simulated board, `rig.recorder._recorder` the recorder's
+law on simulated mechanics.
 """
 
 from __future__ import annotations
@@ -30,9 +31,11 @@ SOUND = ROOT / "rig" / "live" / "sound.h"
 BACKEND = ROOT / "rig" / "force" / "backend.h"
 DHD = ROOT / "rig" / "force" / "dhd.h"
 FORCE = ROOT / "rig" / "force" / "force.h"
+OBSERVER = ROOT / "rig" / "force" / "observer.h"
 STROKE = ROOT / "rig" / "force" / "stroke.h"
 SERVO = ROOT / "rig" / "force" / "servo.h"
 DEVICE = ROOT / "rig" / "device"
+RECORDER = ROOT / "rig" / "recorder"
 STANDIN = ROOT / "rig" / "force" / "standin.h"
 # For GCC and Clang. A multiplication contracted with an addition would round otherwise than Python.
 COMPILER_ARGUMENTS = ["-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno"]
@@ -153,17 +156,25 @@ def standin_binding() -> FFI:
     return builder
 
 
+def virtual_board() -> str:
+    """Declarations of a simulated board in a process, whatever the device is."""
+    public = r"^static (?:inline )?(\w[^;{}=]*?tq_virtual_(?:%s)\([^)]*\))(?=\s*\{)"
+    names = "size|start|receive|step|take|given|shut|run"
+    text = (DEVICE / "virtual.h").read_text("utf-8")
+    found = dict.fromkeys(re.findall(public % names, text, re.MULTILINE))
+    return "\n".join(("typedef struct tq_virtual tq_virtual;", *(f"{call};" for call in found)))
+
+
 def device_binding() -> FFI:
     """The builder of `rig.device._device`: the firmware on a simulated board."""
     header = DEVICE / "virtual.h"
     inner = ("backend.h", "force.h", "kernel.h", "scene.h", "weigh.h")
-    others = ("cables.h", "device.h", "model.h", "registers.h", "simulated.h", "wire.h")
+    others = ("cables.h", "device.h", "mechanics.h", "model.h", "observer.h", "registers.h")
+    others += ("served.h", "simulated.h", "tension.h", "wire.h")
     builder = FFI()
-    builder.cdef("typedef struct tq_virtual tq_virtual;")
-    public = r"^static (?:inline )?(\w[^;{}=]*?tq_virtual_(?:%s)\([^)]*\))(?=\s*\{)"
-    names = "size|start|receive|step|take|converted|shut|run"
-    found = re.findall(public % names, header.read_text("utf-8"), re.MULTILINE)
-    builder.cdef("\n".join(f"{call};" for call in dict.fromkeys(found)))
+    numbers = "typedef double tq_number;\n#define TQ_MOTORS 2"
+    mechanics = (declarations(DEVICE / f"{name}.h") for name in ("cables", "mechanics"))
+    builder.cdef("\n".join((numbers, *mechanics, virtual_board())))
     folders = [DEVICE, FORCE.parent, KERNEL.parent]
     builder.set_source(
         "rig.device._device",
@@ -182,6 +193,37 @@ def device_binding() -> FFI:
     return builder
 
 
+def recorder_binding() -> FFI:
+    """The builder of `rig.recorder._recorder`: the recorder's law on simulated mechanics."""
+    headers = [OBSERVER, *(RECORDER / f"{name}.h" for name in ("control", "plant"))]
+    others = [RECORDER / f"{name}.h" for name in ("registers", "recorder", "simulated", "board")]
+    others += [DEVICE / f"{name}.h" for name in ("wire", "served", "virtual")]
+    builder = FFI()
+    builder.cdef(
+        "\n".join(
+            (
+                "typedef double tq_number;",
+                "#define TQ_AXES 2",
+                "static const int TQ_RESTS, TQ_SPINS, TQ_LOWERS, TQ_SETTLES, TQ_RUNS_IN;",
+                "static const int TQ_RECORDS_NOW, TQ_LIFTS, TQ_RECORDED, TQ_FAILS;",
+                *map(declarations, headers),
+                virtual_board(),
+            )
+        )
+    )
+    builder.set_source(
+        "rig.recorder._recorder",
+        '#include "board.h"',
+        include_dirs=[str(RECORDER), str(DEVICE), str(FORCE.parent)],
+        depends=[str(header) for header in (*headers, *others, BACKEND)],
+        define_macros=[("_GNU_SOURCE", None)],
+        extra_compile_args=COMPILER_ARGUMENTS,
+        optional=True,
+    )
+    return builder
+
+
 live = live_binding()
 standin = standin_binding()
 device = device_binding()
+recorder = recorder_binding()

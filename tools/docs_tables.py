@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 import sys
+from functools import partial
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -28,6 +29,8 @@ from rig.capture import pieces  # noqa: E402
 from rig.device.definition import DEVICE  # noqa: E402
 from rig.hand import scripted  # noqa: E402
 from rig.importing import labels  # noqa: E402
+from rig.recorder import store as recorder_store  # noqa: E402
+from rig.recorder.definition import RECORDER  # noqa: E402
 from rig.wire import generating  # noqa: E402
 from tactileq.commands.schema import declared  # noqa: E402
 
@@ -35,6 +38,7 @@ TABLES = {
     "recordings": recording_set.KNOWN_COLUMNS,
     "labels": labels.LABEL_COLUMNS,
     "pieces": pieces.PIECE_COLUMNS,
+    "recorder": recorder_store.RECORDER_COLUMNS,
     "manifest": stimulus_table.STIMULUS_COLUMNS,
     "trajectory": trajectory.TRAJECTORY_COLUMNS,
     "script": scripted.SCRIPT_COLUMNS,
@@ -57,25 +61,29 @@ PAGES = (
     "docs/saved-files.md",
     "docs/data.md",
     "docs/device-registers.md",
+    "docs/recorder.md",
+    "docs/recorder-registers.md",
 )
 SCHEMAS = {
     "modeling/scenes/shipped/scene.schema.json": "scene",
     "docs/recipe.schema.json": "recipe",
     "rig/setup/rig.schema.json": "rig",
+    "rig/recorder/recorder.schema.json": "recorder",
     "experiments/study/study.schema.json": "study",
 }
 DEVICE_FILES = {
-    "rig/device/registers.h": generating.c_header,
-    "rig/device/registers.py": generating.python_module,
-    "docs/device/vectors.json": generating.vectors,
+    "rig/device/registers.h": (generating.c_header, DEVICE),
+    "rig/device/registers.py": (generating.python_module, DEVICE),
+    "docs/device/vectors.json": (generating.vectors, DEVICE),
+    "rig/recorder/registers.h": (generating.c_header, RECORDER),
+    "rig/recorder/registers.py": (partial(generating.python_module, prefix="Recorder"), RECORDER),
 }
+_OF_A_DEVICE = {"registers": generating.register_table, "masks": generating.mask_tables}
 _MADE = {
     "keys": lambda name: key_tables(declared(name)),
     "table": lambda name: markdown(TABLES[name]).rstrip("\n"),
-    "device": lambda name: {
-        "registers": generating.register_table,
-        "masks": generating.mask_tables,
-    }[name](DEVICE),
+    "device": lambda name: _OF_A_DEVICE[name](DEVICE),
+    "recorder": lambda name: _OF_A_DEVICE[name](RECORDER),
 }
 _MARKED = re.compile(r"(<!-- (\w+): (\S+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
@@ -89,7 +97,7 @@ def generated() -> dict[str, str]:
     """What every page and schema should hold, by its path."""
     pages = {path: page((ROOT / path).read_text(encoding="utf-8")) for path in PAGES}
     pages |= {path: schema_text(declared(name)) for path, name in SCHEMAS.items()}
-    return pages | {path: made(DEVICE) for path, made in DEVICE_FILES.items()}
+    return pages | {path: made(of) for path, (made, of) in DEVICE_FILES.items()}
 
 
 if __name__ == "__main__":

@@ -26,22 +26,22 @@ from modeling.files.folders import folder_behind
 from modeling.files.places import clear_unfinished, locked
 from modeling.files.provenance import PROVENANCE_NAME, provenance_text
 from modeling.files.reading import read_text
-from modeling.files.tables import read_cells, table_text, typed, write_table
+from modeling.files.tables import read_cells, table_text, typed
 from modeling.files.wav import read_wav
 from modeling.files.writing import write_files
 from modeling.models.grid import Condition
 from modeling.recordings.appending import WavSource, append
-from modeling.recordings.recording_set import (
-    INDEX_COLUMNS,
-    INDEX_NAME,
-    listed,
-    load_usable,
-    stated,
-)
+from modeling.recordings.recording_set import INDEX_COLUMNS
 from rig.capture.coverage import Coverage
 from rig.capture.cutting import SHORTEST_PART_S, StrokePart
 from rig.capture.grid import StrokeGrid
 from rig.capture.joining import joined, joined_samples
+from rig.capture.recorded import (
+    begin_index,
+    check_continues,
+    recorded_conditions,
+    unusable_recordings,
+)
 
 PIECES = "pieces"
 TABLE_NAME = "pieces.tsv"
@@ -153,7 +153,7 @@ class PieceStore:
         self._kept: list[_Kept] = []
         self.damaged: list[str] = []  # a sentence for each file that does not count
         self.counts = Counter(kept=0, clipped=0, silent=0, surplus=0)
-        _check_folder(self.folder)
+        check_continues(self.folder, PIECES)
         clear_unfinished(self.folder / PIECES)
         self._read()
         # A run that was killed may have ended between a last piece and its recording.
@@ -231,17 +231,11 @@ class PieceStore:
         return provenance_text(stated).encode()
 
     def _begin_index(self) -> None:
-        """Make the folder a recording set, as yet of none, so that recordings can be added."""
-        if (self.folder / INDEX_NAME).is_file():
-            return
-        if lost := sorted(path.name for path in self.folder.glob("[0-9]*.wav")):
+        if lost := begin_index(self.folder):
             self.damaged.append(
-                f"expected {INDEX_NAME} beside {lost[0]} in {self.folder}, got none, so no "
-                "recording there counts; restore it from a copy, or what there are "
-                "pieces of is recorded again under new names."
+                f"{lost}; restore it from a copy, or what there are pieces of is recorded again "
+                "under new names."
             )
-        with locked(self.folder / INDEX_NAME) as index:
-            write_table(index, INDEX_COLUMNS, [])
 
     def _read(self) -> None:
         table = self.folder / PIECES / TABLE_NAME
@@ -267,9 +261,9 @@ class PieceStore:
                 )
             if row["repeat"] == self.plan.repeat:
                 self._keep_whole(_kept(row))
-        self._recorded = self._listed_conditions()
+        self._recorded = recorded_conditions(self.folder, self.plan.texture, self.plan.repeat)
         if self._recorded:
-            self.damaged += self._unusable_recordings()
+            self.damaged += unusable_recordings(self.folder, self.plan.texture)
 
     def _keep_whole(self, one: _Kept) -> None:
         """Count a piece of an earlier run, unless its file is damaged."""
@@ -288,27 +282,6 @@ class PieceStore:
                 f"{samples.size}; the file is damaged and does not count, stroke there again."
             )
         return samples
-
-    def _listed_conditions(self) -> set[Condition]:
-        """Conditions of which the set holds this repeat."""
-        if not (self.folder / INDEX_NAME).is_file():
-            return set()
-        return {
-            _condition(row)
-            for row in (
-                stated(self.folder, cells)
-                for cells in listed(self.folder)
-                if cells["texture"] == self.plan.texture
-            )
-            if (row["repeat"] or 1) == self.plan.repeat
-        }
-
-    def _unusable_recordings(self) -> tuple[str, ...]:
-        """A sentence for each recording of the texture that its index lists and nobody can read."""
-        try:
-            return load_usable(self.folder, texture=self.plan.texture)[1]
-        except InputError as error:
-            return (str(error),)
 
     def _sizes(self) -> dict[Condition, list[int]]:
         sizes: dict[Condition, list[int]] = {}
@@ -360,20 +333,6 @@ class PieceStore:
             *(bool(piece.simulated or self.plan.simulated), bool(piece.force_assumed)),
         )
         return dict(zip(names(PIECE_COLUMNS), values, strict=True))
-
-
-def _check_folder(folder: Path) -> None:
-    """Refuse a folder that is neither a recording set nor one that pieces are collected in."""
-    if not folder.exists():
-        return
-    ours = {INDEX_NAME, PIECES}
-    if not folder.is_dir() or (
-        not ours & {path.name for path in folder.iterdir()} and any(folder.iterdir())
-    ):
-        raise InputError(
-            f"expected a new folder, or one of recordings to go on with, got {folder}, which is "
-            "something else; choose another name."
-        )
 
 
 def _rows(table: Path) -> list[tuple[str, dict[str, str]]]:

@@ -8,6 +8,7 @@ speed).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ from modeling.arrays import Floats
 from modeling.checks import check_duration
 from modeling.equalizer.bands import band_rms
 from modeling.errors import shown
+from modeling.models.grid import Condition
 from modeling.recordings.spectrum import MODEL_RATE_HZ
 from modeling.seeds import noise_seed
 
@@ -242,25 +244,67 @@ def record_texture(truth: TextureModel, *, duration_s: float = 1.0, seed: int = 
     RecordingSet
         All marked `simulated`.
     """
-    rate_hz = truth.rate_hz
-    check_duration(duration_s, rate_hz)
-    settling, samples = round(SETTLING_S * rate_hz), round(duration_s * rate_hz)
+    check_duration(duration_s, truth.rate_hz)
     conditions = [(v, f) for v in truth.speeds_mm_s.tolist() for f in truth.forces_n.tolist()]
-    count = len(conditions)
-    held = {value: np.full(settling + samples, value) for each in conditions for value in each}
-    vibrations = render_many(
-        [truth] * count,
-        [(held[speed], held[force]) for speed, force in conditions],
-        # Two textures under one seed must not share their noise.
-        seeds=[noise_seed(seed, truth.texture)] * count,
-        streams=range(count),
+    vibrations = _vibrations(
+        [truth] * len(conditions),
+        conditions,
+        duration_s=duration_s,
+        seed=noise_seed(seed, truth.texture),  # two textures under one seed must not share noise
+        streams=range(len(conditions)),
     )
     return RecordingSet(
         [
-            Recording(sensed(g[settling:]), rate_hz, *condition, truth.texture, simulated=True)
+            Recording(g, truth.rate_hz, *condition, truth.texture, simulated=True)
             for g, condition in zip(vibrations, conditions, strict=True)
         ]
     )
+
+
+def vibration_at(
+    texture: str,
+    condition: Condition,
+    *,
+    rate_hz: float = RECORDER_RATE_HZ,
+    duration_s: float = 1.0,
+    seed: int = 0,
+    stream: int = 0,
+) -> Floats:
+    """What the accelerometer reports, (n,) in g, at a speed (mm/s) and a force (N), both above 0.
+
+    As `record_texture`, but of the planted texture at exactly this condition, on its grid or not.
+
+    Parameters
+    ----------
+    stream : int
+        Another one for other noise under the same seed.
+    """
+    check_duration(duration_s, rate_hz)
+    speeds, forces = (np.array([value]) for value in condition)
+    truth = planted_texture(texture, speeds_mm_s=speeds, forces_n=forces, rate_hz=rate_hz)
+    seeds = noise_seed(seed, texture)
+    return _vibrations([truth], [condition], duration_s=duration_s, seed=seeds, streams=[stream])[0]
+
+
+def _vibrations(
+    truths: Sequence[TextureModel],
+    conditions: Sequence[Condition],
+    *,
+    duration_s: float,
+    seed: int,
+    streams: Sequence[int],
+) -> list[Floats]:
+    """What the accelerometer reports of each truth, at its condition, once it has settled."""
+    rate_hz = truths[0].rate_hz
+    settling, samples = round(SETTLING_S * rate_hz), round(duration_s * rate_hz)
+    held = {value: np.full(settling + samples, value) for each in conditions for value in each}
+    vibrations = render_many(
+        truths,
+        [(held[speed], held[force]) for speed, force in conditions],
+        seeds=[seed] * len(truths),
+        streams=streams,
+    )
+    return [sensed(g[settling:]) for g in vibrations]
 
 
 def sensed(acceleration_g: Floats) -> Floats:

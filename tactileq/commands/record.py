@@ -1,4 +1,4 @@
-"""tactileq record: a surface under a hand, or planted textures in silico."""
+"""tactileq record: a surface under a hand or on a recorder, or planted textures in silico."""
 
 from __future__ import annotations
 
@@ -28,6 +28,13 @@ def record(
     audio: Annotated[
         bool, typer.Option("--audio", help="Record by hand, with an accelerometer at a sound card.")
     ] = False,
+    recorder: Annotated[
+        str | None,
+        typer.Option(
+            "--recorder",
+            help="Record with a turntable and a contactor: a recorder file (TOML), or simulated.",
+        ),
+    ] = None,
     rig: OptionalRigPath = None,
     grid: Annotated[
         Path | None,
@@ -53,13 +60,18 @@ def record(
     counts_per_mm: CountsPerMm = None,
     force: AssumedForce = None,
 ) -> None:
-    """Record a surface by hand (--audio), or a planted texture in silico, 7 speeds x 7 forces.
+    """Record a surface by hand (--audio), on a recorder (--recorder), or in silico.
+
+    By default 7 speeds x 7 forces. In silico and on a simulated recorder it is a planted texture.
 
     With --audio you stroke the surface freely; strokes are cut into the conditions of the grid, and
     a map shows which are missing. Ctrl-C ends it; run the command again to continue. --more models
     what is recorded already, and asks for conditions near those that the others predict worst.
+    A recorder holds each speed and force by itself, checks both, and records anew what was off.
 
     Example: tactileq record recordings/oak --audio --texture oak --rig rig.toml --grid grid.toml
+
+    Example: tactileq record recordings/oak --recorder recorder.toml --texture oak
 
     Example: tactileq record recordings/canvas --texture canvas
     """
@@ -69,9 +81,21 @@ def record(
         InputOptions,
         record_by_hand,
     )
+    from tactileq.commands.record_recorder import RecorderRecording, record_on_recorder
 
     by_hand = HandOptions(hand, hand_device, counts_per_mm, force)
     heard = InputOptions(device, channel, rate_hz if audio else None, g_per_fullscale, simulated)
+    if recorder is not None:
+        if audio or rig or (by_hand, heard) != (HandOptions(), InputOptions()):
+            raise ValueError(
+                "expected --recorder without --audio, --rig and options of the hand or the input, "
+                "got both; leave them out, the recorder file says what there is."
+            )
+        options_of_recorder = RecorderRecording(
+            texture, duration_s, repeat, grid, rate_hz=rate_hz, more=more, seed=seed
+        )
+        record_on_recorder(folder, recorder, options_of_recorder)
+        return
     if audio:
         options = HandRecording(texture, duration_s, repeat, grid, rig, by_hand, heard, more)
         record_by_hand(folder, options)
@@ -79,7 +103,8 @@ def record(
     if rig or grid or more or repeat > 1 or (by_hand, heard) != (HandOptions(), InputOptions()):
         raise ValueError(
             "expected --audio with options of the hand, the input, the grid or the repeat, got "
-            "those options without it; add --audio, or leave them out to record in silico."
+            "those options without it; add --audio (or --recorder, for grid and repeat), or leave "
+            "them out to record in silico."
         )
     record_in_silico(folder, texture, rate_hz=rate_hz, duration_s=duration_s, seed=seed)
 

@@ -10,6 +10,17 @@ import typer
 
 from tactileq.interruption import Interrupted
 
+Kind = Literal["process", "m7", "stm32"]
+# Which board, and whether it is a recorder.
+EMULATED: dict[str, tuple[Kind, bool]] = {
+    "process": ("process", False),
+    "m7": ("m7", False),
+    "stm32": ("stm32", False),
+    "recorder": ("process", True),
+    "recorder-m7": ("m7", True),
+    "recorder-stm32": ("stm32", True),
+}
+
 
 def rig_device(
     address: Annotated[
@@ -17,10 +28,11 @@ def rig_device(
         typer.Argument(help="Port or socket://HOST:PORT of a device that is to be asked."),
     ] = None,
     emulate: Annotated[
-        Literal["process", "m7", "stm32"] | None,
+        Literal["process", "m7", "stm32", "recorder", "recorder-m7", "recorder-stm32"] | None,
         typer.Option(
             "--emulate",
-            help="Start one: a process, or a Cortex-M7 or an STM32F405 in QEMU (until Ctrl-C).",
+            help="Start one: a process, or a Cortex-M7 or an STM32F405 in QEMU; the same of a "
+            "recorder of surfaces (until Ctrl-C).",
         ),
     ] = None,
     baud: Annotated[
@@ -37,8 +49,8 @@ def rig_device(
     """Ask a device what it is, or emulate one.
 
     With an address it prints the device's firmware, state and counters, and changes nothing but
-    letting go of what was armed. With --emulate it starts the firmware with a simulated hand and
-    prints where it is reached.
+    letting go of what was armed. With --emulate it starts the firmware with a simulated hand, or
+    simulated mechanics of a recorder, and prints where it is reached.
 
     Example: tactileq rig device --emulate process
     """
@@ -49,18 +61,28 @@ def rig_device(
         )
     if address is not None:
         _ask(address, baud or 1_000_000)
-    elif emulate is not None and firmware is not None:
-        _write_firmware(emulate, firmware, baud)
-    elif emulate is not None:
-        _emulate(emulate, baud, port)
+        return
+    assert emulate is not None
+    kind, recorder = EMULATED[emulate]
+    if firmware is None:
+        _emulate(kind, baud, port, recorder=recorder)
+    elif kind == "process":
+        raise ValueError(
+            f"expected a board for its firmware, got {emulate}, which has none; take "
+            f"{'recorder-m7 or recorder-stm32' if recorder else 'm7 or stm32'}."
+        )
+    else:
+        _write_firmware(kind, firmware, baud, recorder=recorder)
 
 
-def _emulate(kind: Literal["process", "m7", "stm32"], baud: int | None, port: int) -> None:
+def _emulate(kind: Kind, baud: int | None, port: int, *, recorder: bool) -> None:
     from rig.device.emulating import Emulator
 
-    with Emulator(kind, baud=baud, port=port) as emulator:
+    what = "recorder" if recorder else "device"
+    with Emulator(kind, baud=baud, port=port, recorder=recorder) as emulator:
         print(
-            f"emulated device ({kind}, simulated) at {emulator.address}; Ctrl-C ends it", flush=True
+            f"emulated {what} ({kind}, simulated) at {emulator.address}; Ctrl-C ends it",
+            flush=True,
         )
         try:
             while emulator.runs:
@@ -73,25 +95,28 @@ def _emulate(kind: Literal["process", "m7", "stm32"], baud: int | None, port: in
     raise ValueError("expected the emulated device to run, got its end; start it again.")
 
 
-def _write_firmware(kind: Literal["process", "m7", "stm32"], file: Path, baud: int | None) -> None:
+def _write_firmware(kind: Kind, file: Path, baud: int | None, *, recorder: bool) -> None:
     from rig.device.emulating import USUAL_BAUD, build_firmware, check_baud
 
-    if kind == "process":
-        raise ValueError(
-            "expected a board for its firmware, got process, which has none; take m7 or stm32."
-        )
     rate = baud or USUAL_BAUD[kind]
     check_baud(kind, rate)
-    build_firmware(kind, file, baud=rate, simulated=kind == "m7")
-    hand = "a simulated hand" if kind == "m7" else "its own encoders and motors"
-    print(f"{file}: firmware of {kind} at {rate} baud, with {hand}")
+    simulated = kind == "m7"
+    build_firmware(kind, file, baud=rate, simulated=simulated, recorder=recorder)
+    moves = "simulated mechanics" if recorder else "a simulated hand"
+    name = f"a recorder on {kind}" if recorder else kind
+    print(
+        f"{file}: firmware of {name} at {rate} baud, with "
+        f"{moves if simulated else 'its own encoders and motors'}"
+    )
 
 
 def _ask(address: str, baud: int) -> None:
-    from rig.device.asking import ASKED, asked
+    from rig.device.asking import asked
+    from rig.device.definition import DEVICE
+    from rig.recorder.definition import RECORDER
 
-    found = asked(address, baud)
+    found = asked(address, baud, (DEVICE, RECORDER))
     print(f"{address}: {found.name}{', simulated' if found.simulated else ''}")
     print(found.state)
-    for name in ASKED[3:]:
-        print(f"{name} {found.values[name]}")
+    for name, value in found.counts.items():
+        print(f"{name} {value}")

@@ -18,6 +18,7 @@ DECLARED = {
     "recipe": "stimuli.sets.recipe:Recipe",
     "study": "experiments.study.study:Study",
     "rig": "rig.setup.rig_file:RigFile",
+    "recorder": "rig.recorder.recorder_file:RecorderFile",
     "model": "modeling.models.texture_model:TextureModel",
     "regressed-model": "modeling.models.regressed_model:RegressedModel",
     "ar-model": "modeling.models.ar_model:ARModel",

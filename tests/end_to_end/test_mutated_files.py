@@ -50,6 +50,9 @@ from rig.hand.scripted import ScriptedTrajectory
 from rig.importing.files import import_csv, import_wav
 from rig.importing.hatt_reader import load_hatt
 from rig.importing.labels import Label, labels_from_table
+from rig.recorder.evaluation import read_evaluation
+from rig.recorder.recorder_file import SHIPPED_RECORDER_FILE, RecorderFile
+from rig.recorder.store import RECORDER_COLUMNS, RecorderStore
 from rig.setup.rig_file import SHIPPED_RIG_FILE, Figure, RigFile
 from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
 from rig.sound.signals import stimuli_of_surfaces
@@ -259,6 +262,29 @@ def compiled_scene() -> CompiledScene:
     return compile_scene(Scene(name="light touch", hand=hand), {TEXTURE.texture: TEXTURE})
 
 
+def recorder_rows() -> bytes:
+    names = [column.name for column in RECORDER_COLUMNS]
+    row = ["oak", "50", "1", "1", *["0.5"] * 8, "1", "true", "49.9", "1.01"]
+    return "\n".join(["\t".join(names), "\t".join(row), ""]).encode()
+
+
+def use_recorder_file(path: Path) -> Iterable[object]:
+    file = RecorderFile.load(path)
+    yield np.hstack([np.ravel(value) for value in file.law().registers().values()])
+    yield file.law().largest_force_n(1.0)
+
+
+def use_recorder_store(path: Path) -> Iterable[object]:
+    plan = Plan("oak", StrokeGrid([50.0, 100.0], [1.0, 2.0]), 1000.0, wanted_s=0.4)
+    store = RecorderStore(path.parent, plan, radius_mm=40.0)
+    yield len(store.missing)
+    yield len(store.rows())
+
+
+def use_evaluation(path: Path) -> Iterable[object]:
+    yield read_evaluation(path, rate_hz=1000.0)
+
+
 def ar_model() -> ARModel:
     return ARModel(
         texture="oak",
@@ -426,6 +452,12 @@ PIECES = (
     b"00001.wav\toak\t80.0\t1.0\t1\t5000.0\t1000\t81\t2\t1\t0.1\tfalse\tfalse\n"
     b"00002.wav\toak\t80.0\t1.0\t1\t5000.0\t900\t81\t2\t1\t0.1\ttrue\tfalse\n"
 )
+EVALUATION = b"Time(s),ax(g),ay(g),az(g)\n" + b"".join(
+    b"%.6f,0.1,%.4f,-0.2\n" % (n / 1000, n / 50) for n in range(40)
+)
+RECORDER_PLAN = b"""{"texture": "oak", "conditions": [[50.0, 1.0], [100.0, 1.0], [100.0, 2.0]],
+"rate_hz": 1000.0, "duration_s": 0.4, "repeat": 1, "radius_mm": 40.0, "simulated": false}
+"""
 KINDS: dict[str, tuple[str, Use]] = {
     "model": ("model.json", use_model),
     "regressed model": ("regressed.json", use_model),
@@ -450,6 +482,10 @@ KINDS: dict[str, tuple[str, Use]] = {
     "rig file": ("rig.toml", use_rig_file),
     "simulated vibrator": ("in_silico.toml", use_simulated_vibrator),
     "grid of strokes": ("grid.toml", use_stroke_grid),
+    "recorder file": ("recorder.toml", use_recorder_file),
+    "plan of a recorder": ("held/recorder.json", use_recorder_store),
+    "table of a recorder": ("held/recorder.tsv", use_recorder_store),
+    "file of the evaluation tool": ("evaluation.csv", use_evaluation),
     "pieces of strokes": ("strokes/pieces/pieces.tsv", use_pieces),
     "vibrator": ("vibrator.json", use_vibrator),
     "simplification": ("x_simplification.json", use_simplification),
@@ -473,6 +509,7 @@ def write_good_files(folder: Path, hatt_xml: str) -> None:
     RecordingSet(Recording(NOISE[:80], 5000.0, v, 1.0, "oak") for v in (50, 100)).save(
         folder / "set"
     )
+    RecordingSet(Recording(NOISE, 1000.0, v, 1.0, "oak") for v in (50, 100)).save(folder / "held")
     contents = {
         "a.wav": wav_bytes(),
         "run.csv": csv_bytes(),
@@ -490,6 +527,10 @@ def write_good_files(folder: Path, hatt_xml: str) -> None:
         "in_silico.toml": b"frequency_hz = 90.0\nheight = 3.5\nhum_g = 0.01\nseed = 4\n",
         "grid.toml": STROKES,
         "strokes/pieces/pieces.tsv": PIECES,
+        "recorder.toml": SHIPPED_RECORDER_FILE.read_bytes(),
+        "held/recorder.json": RECORDER_PLAN,
+        "held/recorder.tsv": recorder_rows(),
+        "evaluation.csv": EVALUATION,
         "threshold.tsv": THRESHOLD,
         **{name: text.encode() for name, text in DATA.items()},
         f"{HAND_STEM}events.tsv": EVENTS.encode(),

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import subprocess
 import tempfile
+import time
 from pathlib import Path
 
 from rig.device.emulating import Emulator
+from rig.device.virtual import TICK_HZ
 from tests.rig.device.compiled import compiled_walks
 from tests.rig.device.killing import ticks_after_kill
+from tests.rig.device.talking import Talk
 
 KILLS = 100
+BENCH_S = 120.0
 
 
 def main() -> None:
@@ -22,6 +26,12 @@ def main() -> None:
         subprocess.run([fast, "paths", "5"], check=True)
         subprocess.run([fast, "limits", "23", "100000000"], check=True)
         subprocess.run([fast, "silences", "10000"], check=True)
+    talk = Talk()
+    talk.push()
+    begun_s = time.perf_counter()
+    talk.run(BENCH_S)
+    faster = BENCH_S / (time.perf_counter() - begun_s)
+    print(f"simulated device: {faster:.0f} x real time, {faster * TICK_HZ:.3g} ticks/s")
     with Emulator("process") as device:
         ticks = [ticks_after_kill(device.address, seed) for seed in range(KILLS)]
     print(f"kills {KILLS} shortest {min(ticks)} longest {max(ticks)}")

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from rig.device.emulating import KINDS, Emulator, Kind, build_firmware, check_ba
 from rig.device.models import device_model
 from rig.device.registers import DeviceCommand, DeviceSource, DeviceState
 from rig.wire.conversation import Conversation
-from rig.wire.transports import opened_transport
+from rig.wire.transports import Transport, opened_transport
 from stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 from tests.rig.device.independent_client import Client
@@ -39,15 +40,18 @@ BAND = 0.2  # for other versions of the compiler
 class BuiltEmulator(Emulator):
     """Its firmware was compiled before, by one worker for all."""
 
-    def __init__(self, kind: Kind, once_per_run: Callable[..., Any]) -> None:
-        super().__init__(kind, baud=FAST if kind == "stm32" else None)
+    def __init__(
+        self, kind: Kind, once_per_run: Callable[..., Any], *, recorder: bool = False
+    ) -> None:
+        super().__init__(kind, baud=FAST if kind == "stm32" else None, recorder=recorder)
         self._once = once_per_run
 
     def _built(self) -> Path:
         def build(folder: Path) -> Path:
-            return build_firmware(self._kind, folder / "firmware.elf", baud=self._baud)
+            file = folder / "firmware.elf"
+            return build_firmware(self._kind, file, baud=self._baud, recorder=self._recorder)
 
-        return Path(self._once(f"firmware-{self._kind}", build))
+        return Path(self._once(f"firmware-{'recorder-' * self._recorder}{self._kind}", build))
 
 
 @pytest.fixture(scope="module", params=KINDS)
@@ -148,31 +152,38 @@ def test_instructions_are_those_of_the_page(device: Emulator) -> None:
     page = (DOCS / "device.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (.+?) \| (\d+) \|$", page, flags=re.MULTILINE)
     stated = {name: int(count) for name, count in rows}
+    with counting_board(device.firmware) as transport:
+        talk = Conversation(transport, DEVICE)
+        hello = talk.hello()
+        counted = {}
+        for command in (DeviceCommand.HOME, DeviceCommand.ARM, DeviceCommand.SHOW):
+            talk.write("Command", command)
+        counted["force alone"] = per_tick(talk)
+        for layers in (1, 4, 8):
+            upload = device_model(layered_texture(layers), hello)
+            talk.upload(upload.data, upload.hash)
+            talk.write("Source", DeviceSource.MODEL)
+            counted[f"{layers} layer{'s' * (layers > 1)}"] = per_tick(talk)
+    print("\ninstructions per tick:", {name: round(count) for name, count in counted.items()})
+    for name, count in counted.items():
+        assert count == pytest.approx(stated[name], rel=BAND)
+    assert counted["4 layers"] <= 1500
+
+
+@contextmanager
+def counting_board(firmware: Path | None) -> Iterator[Transport]:
+    """An STM32F405 in QEMU whose every instruction takes a nanosecond."""
     command = ["qemu-system-arm", "-M", "netduinoplus2", "-display", "none", "-monitor", "none"]
-    command += ["-serial", "pty", "-kernel", str(device.firmware), "-icount", "shift=0"]
+    command += ["-serial", "pty", "-kernel", str(firmware), "-icount", "shift=0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as qemu:
         try:
             assert qemu.stdout is not None
             path = qemu.stdout.readline().decode().split("redirected to ")[1].split()[0]
             transport = opened_transport(path, BAUD)
-            talk = Conversation(transport, DEVICE)
-            hello = talk.hello()
-            counted = {}
-            for command_ in (DeviceCommand.HOME, DeviceCommand.ARM, DeviceCommand.SHOW):
-                talk.write("Command", command_)
-            counted["force alone"] = per_tick(talk)
-            for layers in (1, 4, 8):
-                upload = device_model(layered_texture(layers), hello)
-                talk.upload(upload.data, upload.hash)
-                talk.write("Source", DeviceSource.MODEL)
-                counted[f"{layers} layer{'s' * (layers > 1)}"] = per_tick(talk)
+            yield transport
             transport.close()
         finally:
             qemu.kill()
-    print("\ninstructions per tick:", {name: round(count) for name, count in counted.items()})
-    for name, count in counted.items():
-        assert count == pytest.approx(stated[name], rel=BAND)
-    assert counted["4 layers"] <= 1500
 
 
 def per_tick(talk: Conversation) -> float:

@@ -162,7 +162,7 @@ def test_the_converter_is_given_its_own_unit() -> None:
     talk.write("Samples", (0.2,) * SAMPLES)
     talk.write("Source", DeviceSource.HOST)
     assert talk.number("Vibration") == pytest.approx(0.2)
-    assert talk.wire.board.converted == pytest.approx(0.5)
+    assert talk.wire.board.given(2) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("seconds", [0.005, 0.1])

@@ -215,11 +215,12 @@ static int limits(unsigned long long seed, long ticks)
             write_float(v, TQD_FORCE_SLEW, (float)(100 + 9000 * chance()));
             write_pair(v, TQD_TENSION_RANGE, (float)chance(), (float)(1 + 90 * chance()));
         } else if (draw < 0.0051) {
-            v->device.simulate = (int)below(8);
+            v->device.simulate = (int)below(10);
         } else if (draw < 0.0054) {
             v->device.simulate = 0;
         } else if (draw < 0.0056) {
-            v->simulated.vz_mm_s -= 300 * (chance() - 0.3), v->simulated.vx_mm_s += 400 * (chance() - 0.5);
+            v->simulated.mechanics.vz_mm_s -= 300 * (chance() - 0.3);
+            v->simulated.mechanics.vx_mm_s += 400 * (chance() - 0.5);
         } else if (draw < 0.0058) {
             v->device.values.stroke[0] = (float)(150 * chance()), v->device.values.stroke[2] = (float)(30 * chance());
         }

@@ -1,0 +1,1 @@
+"""The paper's recorder: a turntable and a contactor, force-controlled without a force sensor."""

@@ -1,0 +1,142 @@
+"""tactileq record --recorder: on a recorder in virtual time, and on an emulated one in a process.
+
+All recorders here are simulated.
+"""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.textures.between import halfway, truth_summary
+from modeling import RecordingSet, fit_texture
+from modeling.files.tables import read_cells
+from rig.device.emulating import Emulator
+from rig.recorder.recorder_file import SHIPPED_RECORDER_FILE, RecorderFile
+from rig.recorder.store import RECORDER_COLUMNS, TABLE_NAME
+from stimuli.planted.textures import (
+    FORCES_N,
+    RECORDER_RATE_HZ,
+    SPEEDS_MM_S,
+    PlantedSurface,
+    planted_texture,
+    record_texture,
+)
+from tests.refusals import check_refusal
+
+GRID = """
+speeds_mm_s = [100, 200]
+forces_n = [1, 2]
+"""
+COLD = """
+version = 1
+[recorder]
+name = "bench {name}"
+address = "{address}"
+simulated = true
+[sample]
+run_in_s = 0.05
+"""
+
+
+def conditions_of(folder: Path) -> list[tuple[float, float]]:
+    return [record.condition for record in RecordingSet.load(folder)]
+
+
+def test_a_simulated_recorder_records_the_whole_grid(main: Any, tmp_path: Path) -> None:
+    """What is modelled from it is what is modelled from records in silico, within 0.1 dB."""
+    made = main("record", "canvas", "--recorder", "simulated", "--texture", "canvas")
+    assert made.returncode == 0, made.stderr
+    assert "49 of 49 conditions" in made.stdout
+    assert "simulated" in made.stdout
+    records = RecordingSet.load(tmp_path / "canvas")
+    assert all(record.simulated for record in records)
+    on_recorder, in_silico = (
+        truth_summary(
+            fit_texture(one).peq,
+            PlantedSurface("canvas"),
+            halfway(SPEEDS_MM_S.tolist(), FORCES_N.tolist()),
+            frequency_hz=np.arange(20.0, 1000.0, 5.0),
+        )
+        for one in (records, record_texture(planted_texture("canvas", rate_hz=RECORDER_RATE_HZ)))
+    )
+    assert all(found < direct + 0.1 for found, direct in zip(on_recorder, in_silico, strict=True))
+    again = main("record", "canvas", "--recorder", "simulated", "--texture", "canvas")
+    assert "0 of them in this run" in again.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "facts"),
+    [
+        (("--texture", "oak"), {"names": ["oak", "canvas"]}),
+        (("--texture", "canvas", "--audio"), {"names": "--audio"}),
+        (("--texture", "canvas", "--rig", "rig.toml"), {"names": "--rig"}),
+        (("--texture", "canvas", "--grid", "strong.toml"), {"names": "N", "got": "9"}),
+        (("--texture", "canvas", "--grid", "none.toml"), {"names": "none.toml"}),
+    ],
+)
+def test_what_cannot_be_recorded_is_refused(
+    main: Any, tmp_path: Path, options: tuple[str, ...], facts: dict[str, Any]
+) -> None:
+    (tmp_path / "strong.toml").write_text(GRID.replace("2]\n", "9]\n"))
+    refused = main("record", "out", "--recorder", "simulated", *options)
+    assert refused.returncode != 0
+    check_refusal(refused.stderr.splitlines()[-1].removeprefix("error: "), **facts)
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_shipped_file_is_the_default_law() -> None:
+    from rig.recorder.law import RecorderLaw
+
+    assert RecorderFile.load(SHIPPED_RECORDER_FILE).law() == RecorderLaw()
+
+
+@pytest.mark.timeout(120)
+def test_a_killed_computer_goes_on_with_what_is_missing(main: Any, tmp_path: Path) -> None:
+    """The recorder, a process of its own, lets go and takes the next host."""
+    (tmp_path / "grid.toml").write_text(GRID.replace("100, 200", "200"))
+    words = ("record", "canvas", "--recorder", "recorder.toml", "--texture", "canvas")
+    words = (*words, "--duration", "0.2", "--grid", "grid.toml")
+    with Emulator("process", recorder=True) as emulator:
+        (tmp_path / "recorder.toml").write_text(
+            COLD.format(name=tmp_path.name, address=emulator.address)
+        )
+        first = subprocess.Popen([sys.executable, "-m", "tactileq", *words], cwd=tmp_path)
+        end_s = time.monotonic() + 60
+        while not (tmp_path / "canvas" / TABLE_NAME).exists():
+            assert first.poll() is None
+            assert time.monotonic() < end_s
+            time.sleep(0.02)
+        time.sleep(0.5)
+        first.send_signal(signal.SIGKILL)
+        first.wait()
+        asked = main("rig", "device", emulator.address)
+        assert "tactileq-recorder" in asked.stdout
+        assert "state FAILS" in asked.stdout
+        before = (tmp_path / "canvas/0001.csv").read_bytes()
+        second = main(*words)
+    assert second.returncode == 0, second.stderr
+    assert "1 of them in this run" in second.stdout
+    assert conditions_of(tmp_path / "canvas") == [(200.0, 1.0), (200.0, 2.0)]
+    assert (tmp_path / "canvas/0001.csv").read_bytes() == before
+    rows = read_cells(tmp_path / "canvas" / TABLE_NAME, RECORDER_COLUMNS)
+    assert [float(row["true_force_n"]) for _, row in rows] == pytest.approx([1, 2], rel=0.03)
+
+
+def test_an_emulated_recorder_is_not_taken_for_a_real_one(main: Any, tmp_path: Path) -> None:
+    with Emulator("process", recorder=True) as emulator:
+        text = COLD.format(name=tmp_path.name, address=emulator.address)
+        (tmp_path / "recorder.toml").write_text(text.replace("simulated = true\n", ""))
+        refused = main("record", "out", "--recorder", "recorder.toml", "--texture", "oak")
+    assert refused.returncode != 0
+    check_refusal(
+        refused.stderr.removeprefix("error: "), names="recorder.simulated", got="emulated"
+    )
+    assert not (tmp_path / "out").exists()
