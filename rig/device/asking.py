@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from modeling.errors import InputError
 from rig.device.definition import DEVICE
-from rig.device.registers import DeviceCause, DeviceState
 from rig.wire.conversation import Conversation, Hello
-from rig.wire.definition import Value
+from rig.wire.definition import Definition, Value
 from rig.wire.transports import TransportLost, opened_transport
 
-ASKED = ("Simulated", "State", "Cause", "Tick", "ModelHash", "FramesBad", "RecordsLost")
+STATED = ("Simulated", "State", "Cause")
+COUNTED = ("Tick", "ModelHash", "Number", "FramesBad", "RecordsLost")
 
 
 @dataclass(frozen=True)
 class Asked:
-    """A device's hello and some of its registers by name."""
+    """What a device is, its hello and some of its registers by name."""
 
+    definition: Definition
     hello: Hello
     values: dict[str, Value]
 
@@ -33,21 +35,32 @@ class Asked:
         precision = "double" if hello.real_size == 8 else "single"
         version = ".".join(map(str, hello.firmware_version))
         return (
-            f"{DEVICE.name}, firmware {version}, schema {hello.schema_hash:016x}, "
+            f"{self.definition.name}, firmware {version}, schema {hello.schema_hash:016x}, "
             f"{hello.tick_rate_hz:g} Hz, {precision} precision"
         )
 
     @property
     def state(self) -> str:
         """State and last cause."""
-        state, cause = self.values["State"], self.values["Cause"]
-        assert isinstance(state, int)
-        assert isinstance(cause, int)
-        return f"state {DeviceState(state).name}, last cause {DeviceCause(cause).name}"
+        return f"state {self._named('State')}, last cause {self._named('Cause')}"
+
+    @property
+    def counts(self) -> dict[str, Value]:
+        """Its counters by name, as many as it has."""
+        return {name: self.values[name] for name in COUNTED if name in self.values}
+
+    def _named(self, mask: str) -> str:
+        members = self.definition.masks[mask].members
+        return next(name for name, (value, _) in members.items() if value == self.values[mask])
 
 
-def asked(address: str, baud: int) -> Asked:
+def asked(address: str, baud: int, definitions: Sequence[Definition] = (DEVICE,)) -> Asked:
     """Say hello to a device, which lets go of what was armed, and read what it is.
+
+    Parameters
+    ----------
+    definitions : sequence of Definition
+        Of the devices that it may be.
 
     Raises
     ------
@@ -56,8 +69,16 @@ def asked(address: str, baud: int) -> Asked:
     """
     transport = opened_transport(address, baud)
     try:
-        talk = Conversation(transport, DEVICE)
-        return Asked(talk.hello(), {name: talk.read(name) for name in ASKED})
+        for definition in definitions:
+            talk = Conversation(transport, definition)
+            try:
+                hello = talk.hello()
+            except InputError as error:
+                refused = error
+                continue
+            names = [name for name in (*STATED, *COUNTED) if name in definition.registers]
+            return Asked(definition, hello, {name: talk.read(name) for name in names})
+        raise refused
     except TransportLost as lost:
         raise InputError(
             f"expected a device that stays at {address}, got an end: {lost} Check its cable and "

@@ -10,18 +10,6 @@
 
 #include "backend.h"
 
-#ifdef TQ_FREESTANDING
-#define TQ_ROOT_SINGLE __builtin_sqrtf
-#define TQ_ROOT_DOUBLE __builtin_sqrt
-#else
-#include <math.h>
-#define TQ_ROOT_SINGLE sqrtf
-#define TQ_ROOT_DOUBLE sqrt
-#endif
-#define TQ_ROOT(x)                                                                     \
-    (sizeof(tq_number) == sizeof(float) ? (tq_number)TQ_ROOT_SINGLE((float)(x))          \
-                                        : (tq_number)TQ_ROOT_DOUBLE((double)(x)))
-
 enum { TQ_LEFT, TQ_RIGHT, TQ_MOTORS };
 
 typedef struct {
@@ -29,18 +17,21 @@ typedef struct {
     tq_number mm_per_count;            /* of cable; positive where a longer cable counts up */
     tq_number n_per_a;                 /* tension by current: the motor's constant over its pulley's radius */
     tq_number nominal_a;               /* what a motor bears for ever */
+    tq_number rewind_n;                /* of the spring on each pulley, without a current */
+    tq_number motor_kg;                /* its rotor's inertia over the square of its pulley's radius */
     tq_number rest_x_mm, rest_z_mm;    /* where the tool stands when it is at home */
     tq_number damping_n_s_per_mm;      /* viscous, of the device itself */
 } tq_cables;
 
 #define TQ_REST_Z_MM (-30)
 
-/* Motors of 27.3 mN m/A and 4.12 A at 300 mm from the middle, encoders of 4096 counts on pulleys of 10 mm;
-   half distance, counts, pulleys, rest and damping are assumed. */
+/* Motors of 27.3 mN m/A, 72.8 g cm² and 4.12 A at 300 mm from the middle, encoders of 4096 counts on pulleys of 10 mm;
+   half distance, counts, pulleys, rest and damping are assumed. Without springs, which the paper does not name. */
 static inline tq_cables tq_usual_cables(void)
 {
     tq_cables c;
     c.half_mm = 300, c.mm_per_count = (tq_number)0.015339808, c.n_per_a = (tq_number)2.73;
+    c.rewind_n = 0, c.motor_kg = (tq_number)0.0728;
     c.nominal_a = (tq_number)4.12, c.rest_x_mm = 0, c.rest_z_mm = TQ_REST_Z_MM;
     c.damping_n_s_per_mm = (tq_number)0.0005;
     return c;

@@ -14,6 +14,7 @@
 #include "force.h"
 #include "model.h"
 #include "registers.h"
+#include "tension.h"
 #include "weigh.h"
 #include "wire.h"
 
@@ -26,6 +27,7 @@ enum {
     TQ_FLUSH_TICKS = TQ_TICK_HZ / 500,   /* a record waits no longer for others of its frame */
     TQ_RECORDS = 64, TQ_PER_FRAME = 10, TQ_RECORD_BYTES = 21, TQ_EVENT_HEADER = 11,
     TQ_SAMPLES = 1024, TQ_MOST_QUEUED = 1000,
+    TQ_SLACK_READINGS = 10,              /* in so many of its own a cable that carries too little is slack */
     TQ_TAPS = 64,                        /* of the tracking filter at most: twice its delay in ms */
     TQ_OUTPUTS = 3, TQ_VIBRATOR = 2
 };
@@ -68,6 +70,7 @@ typedef struct {
     /* The encoders. */
     uint16_t counts[TQ_MOTORS];
     int32_t counted[TQ_MOTORS], still[TQ_MOTORS]; /* since home; at the last move of each encoder */
+    int32_t most_still; /* counts of the other one in the meantime: 3 mm */
     int counting, homed;
     tq_number rest_mm[TQ_MOTORS], length_mm[TQ_MOTORS]; /* of the cables, at home and now */
     /* Speed along x: the tracking filter on one position in a millisecond. */
@@ -75,7 +78,12 @@ typedef struct {
     int tracked, taps, track_at;
     /* Currents and what they heat. */
     tq_number current_a[TQ_MOTORS], heat_a2_s[TQ_MOTORS];
+    tq_number least_n, most_tension_n[2]; /* of a cable; the largest one of a cool and of a hot motor */
     int clipped, failing, releasing;
+    /* What each cable carries, by its motor's movement. */
+    tq_motor motor;
+    tq_felt felt[TQ_MOTORS];
+    tq_number m_s_per_count;
     int noted; /* the state at the end of the last tick; commands come in between */
     /* The vibration. */
     tq_upload uploads[2];
@@ -107,6 +115,8 @@ typedef struct {
     int simulate; /* what a simulated board has to do next, -1 for nothing */
 } tq_device;
 
+#include "served.h"
+
 /* --- Start ---------------------------------------------------------------------------------------- */
 
 /* Integral of the tracking filter's weight up to here; rig/hand/tracking.py. */
@@ -132,11 +142,12 @@ static inline void tq_device_defaults(tq_device *d)
     v->stroke[0] = 40, v->stroke[1] = 0.5f, v->stroke[2] = 4;
 }
 
-/* The limits of the law, from the registers. */
+/* The limits of the law and of the cables, from the registers. */
 static inline void tq_device_limit(tq_device *d)
 {
     tq_force_limits *l = &d->force.limits;
     const tqd_values *v = &d->values;
+    const tq_cables *c = &d->board.cables;
     int n;
     memset(l, 0, sizeof *l);
     l->late_s = 1, l->frozen_s = v->frozen_time, l->release_s = v->release_time, l->show_s = (tq_number)0.2;
@@ -148,6 +159,14 @@ static inline void tq_device_limit(tq_device *d)
     l->origin_mm[2] = -50;
     for (n = 0; n < 3; n++)
         l->axes[4 * n] = 1;
+    d->least_n = v->tension_range[0] > c->rewind_n ? v->tension_range[0] : c->rewind_n;
+    if (d->least_n > v->current_limit * c->n_per_a + c->rewind_n)
+        d->least_n = v->current_limit * c->n_per_a + c->rewind_n;
+    for (n = 0; n < 2; n++) {
+        tq_number current = n && v->current_limit > c->nominal_a ? c->nominal_a : v->current_limit;
+        tq_number bound = current * c->n_per_a + c->rewind_n;
+        d->most_tension_n[n] = bound < v->tension_range[1] ? bound : v->tension_range[1];
+    }
 }
 
 /* The tracking filter with this delay, anew. */
@@ -166,12 +185,14 @@ static inline void tq_device_home(tq_device *d)
     int n;
     for (n = 0; n < TQ_MOTORS; n++)
         d->counted[n] = d->still[n] = 0;
+    memset(d->felt, 0, sizeof d->felt);
     d->homed = 1, d->force.sensed = 0, d->tracked = 0;
 }
 
 /* Everything off, without force, and nothing greeted. */
 static inline void tq_device_start(tq_device *d, const tq_board *board)
 {
+    const tq_number felt_s = (tq_number)(2 * TQ_READ_TICKS) / TQ_TICK_HZ;
     tq_force_limits none;
     int n;
     memset(d, 0, sizeof *d);
@@ -186,6 +207,9 @@ static inline void tq_device_start(tq_device *d, const tq_board *board)
     for (n = 0; n < TQ_MOTORS; n++)
         d->rest_mm[n] =
             tq_cable_length(&board->cables, n, board->cables.rest_x_mm, board->cables.rest_z_mm);
+    d->most_still = (int32_t)(3 / tq_force_size(board->cables.mm_per_count));
+    d->motor = tq_cable_motor(&board->cables, felt_s);
+    d->m_s_per_count = board->cables.mm_per_count / 1000 / felt_s;
     tq_device_track(d);
     d->values.vibration_range = board->most_g;
     d->values.stiffness_limit = (float)tq_largest_stiffness(
@@ -220,17 +244,33 @@ static inline void tq_device_count(tq_device *d, const uint16_t counts[TQ_MOTORS
 /* Whether one encoder has stood still while the other one went on for 3 mm. */
 static inline int tq_device_stuck(tq_device *d)
 {
-    const tq_number most = 3 / tq_force_size(d->board.cables.mm_per_count);
-    tq_number moved[TQ_MOTORS];
+    int32_t moved[TQ_MOTORS];
     int n;
+    if (!d->force.engaged) { /* no wall can push; on the way to the real surface one encoder may well stand still */
+        for (n = 0; n < TQ_MOTORS; n++)
+            d->still[n] = d->counted[n];
+        return 0;
+    }
     for (n = 0; n < TQ_MOTORS; n++)
-        moved[n] = tq_force_size((tq_number)(d->counted[n] - d->still[n]));
-    if ((moved[0] == 0 && moved[1] > most) || (moved[1] == 0 && moved[0] > most))
+        moved[n] = d->counted[n] > d->still[n] ? d->counted[n] - d->still[n] : d->still[n] - d->counted[n];
+    if ((moved[0] == 0 && moved[1] > d->most_still) || (moved[1] == 0 && moved[0] > d->most_still))
         return 1;
     if (moved[0] != 0 && moved[1] != 0)
         for (n = 0; n < TQ_MOTORS; n++)
             d->still[n] = d->counted[n];
     return 0;
+}
+
+/* Lets go where a cable is slack. One cable in each reading, in turn; none while a tick stands for several. */
+static inline void tq_device_feel(tq_device *d, int ticks)
+{
+    const int n = (int)(d->read_tick & 1);
+    if (ticks != 1)
+        memset(d->felt, 0, sizeof d->felt);
+    else
+        tq_feel(&d->felt[n], &d->motor, d->current_a[n], d->counted[n], d->m_s_per_count);
+    if (d->felt[n].slack >= TQ_SLACK_READINGS && (d->force.state == TQ_ARMED || d->force.state == TQ_RUNNING))
+        tq_force_event(&d->force, TQ_FAILED, TQ_SLACK);
 }
 
 static inline void tq_device_sense(tq_device *d, int button, tq_sensed *sensed)
@@ -256,12 +296,14 @@ static inline void tq_device_mind(tq_device *d)
         tq_force_event(&d->force, TQ_FAILED, TQ_NOT_WRITTEN);
 }
 
-/* Currents for the force that was decided; none in a state without force. */
+/* Currents for the force that was decided; none in a state without force. Springs on the pulleys pull, whatever
+   the current. */
 static inline void tq_device_pull(tq_device *d)
 {
     const tq_cables *c = &d->board.cables;
     const tqd_values *v = &d->values;
-    const tq_number step_s = (tq_number)1 / TQ_TICK_HZ;
+    const tq_number step_s = (tq_number)1 / TQ_TICK_HZ, rewind = c->rewind_n, n_per_a = c->n_per_a;
+    const tq_number nominal = c->nominal_a, least = d->least_n;
     int state = d->force.state, n;
     int allowed = state == TQ_ARMED || state == TQ_RUNNING;
     tq_number tension[TQ_MOTORS] = { 0, 0 }, most = 1, force = d->force.normal_n > 0 ? d->force.normal_n : 0;
@@ -271,11 +313,7 @@ static inline void tq_device_pull(tq_device *d)
                                tension);
     d->clipped = 0;
     for (n = 0; n < TQ_MOTORS; n++) { /* both by one factor: the force keeps its direction */
-        tq_number bound = v->tension_range[1], current = v->current_limit;
-        if (d->heat_a2_s[n] >= (tq_number)v->heat_limit && current > c->nominal_a)
-            current = c->nominal_a;
-        if (bound > current * c->n_per_a)
-            bound = current * c->n_per_a;
+        tq_number bound = d->most_tension_n[d->heat_a2_s[n] >= (tq_number)v->heat_limit];
         if (tension[n] > bound) {
             d->clipped = 1;
             if (bound / tension[n] < most)
@@ -283,18 +321,16 @@ static inline void tq_device_pull(tq_device *d)
         }
     }
     for (n = 0; n < TQ_MOTORS; n++) {
-        tq_number current, over;
-        tension[n] *= most;
-        if (allowed && tension[n] < (tq_number)v->tension_range[0])
-            tension[n] = v->tension_range[0];
-        current = tension[n] / c->n_per_a;
-        if (current > (tq_number)v->current_limit)
-            current = v->current_limit;
+        tq_number current, over, pulls = tension[n] * most;
+        if (allowed && pulls < least) /* below 0: outside the cone */
+            pulls = least, d->clipped |= force > 0;
+        current = pulls > rewind ? (pulls - rewind) / n_per_a : 0;
+        over = d->heat_a2_s[n] + (current * current - nominal * nominal) * step_s;
+        over = over > 0 ? over : 0;
+        d->heat_a2_s[n] = over, d->values.heat[n] = (float)over;
         d->current_a[n] = current;
-        over = (current * current - c->nominal_a * c->nominal_a) * step_s;
-        d->heat_a2_s[n] = d->heat_a2_s[n] + over > 0 ? d->heat_a2_s[n] + over : 0;
-        d->values.tension[n] = (float)(current * c->n_per_a);
-        d->values.current[n] = (float)current, d->values.heat[n] = (float)d->heat_a2_s[n];
+        d->values.tension[n] = (float)(current * n_per_a + rewind);
+        d->values.current[n] = (float)current;
     }
 }
 
@@ -460,7 +496,8 @@ static inline void tq_device_record(tq_device *d, int button)
                          | (d->clipped ? TQD_FLAGS_CLIPPED : 0) | (d->force.beyond ? TQD_FLAGS_BEYOND : 0)
                          | (v->source == TQD_SOURCE_HOST && d->samples_in == d->samples_out
                                 ? TQD_FLAGS_EMPTY : 0)
-                         | (d->board.simulated ? TQD_FLAGS_SIMULATED : 0));
+                         | (d->board.simulated ? TQD_FLAGS_SIMULATED : 0)
+                         | (d->felt[0].slack || d->felt[1].slack ? TQD_FLAGS_SLACK : 0));
     d->records_in++; /* after the record is whole: the main loop reads it then */
 }
 
@@ -478,17 +515,21 @@ static inline void tq_device_tick(tq_device *d, const uint16_t counts[TQ_MOTORS]
 {
     tq_sensed sensed;
     tqd_values *v = &d->values;
+    int reads = v->tick / TQ_READ_TICKS != d->read_tick;
+    d->read_tick = v->tick / TQ_READ_TICKS;
     tq_device_count(d, counts);
     tq_device_sense(d, button, &sensed);
     tq_device_mind(d);
+    d->force.off = button; /* the real surface is touched then */
     tq_force_tick(&d->force, &sensed, (tq_number)ticks / TQ_TICK_HZ);
     if (tq_device_stuck(d) && (d->force.state == TQ_ARMED || d->force.state == TQ_RUNNING))
         tq_force_event(&d->force, TQ_FAILED, TQ_STUCK); /* unless it jumped */
+    if (reads)
+        tq_device_feel(d, ticks);
     tq_device_pull(d);
     v->position[0] = (float)sensed.position_mm[0], v->position[1] = (float)sensed.position_mm[2];
     v->depth = (float)d->force.depth_mm, v->button = (uint8_t)button;
-    tq_device_vibrate(d, v->tick / TQ_READ_TICKS != d->read_tick);
-    d->read_tick = v->tick / TQ_READ_TICKS;
+    tq_device_vibrate(d, reads);
     v->state = (uint8_t)d->force.state, v->cause = (uint8_t)d->force.cause;
     tq_device_act(d);
     tq_device_note(d);
@@ -502,59 +543,6 @@ static inline void tq_device_clocks(tq_device *d, uint32_t clocks)
     d->clocks_ticks++, d->clocks_sum += clocks;
     if (clocks > d->clocks_most)
         d->clocks_most = clocks;
-}
-
-/* --- Frames: replies --------------------------------------------------------------------------------- */
-
-static inline void tq_device_send(tq_device *d, const uint8_t *bytes, size_t count)
-{
-    if (d->board.room(d->board.context) >= count)
-        d->board.send(d->board.context, bytes, count);
-}
-
-/* Sends a reply, and keeps it: a frame that is repeated is answered again and done once. */
-static inline void tq_device_reply(tq_device *d, const tq_frame *f, int status, const uint8_t *body,
-                                   size_t count)
-{
-    uint8_t whole[TQ_MOST_BODY];
-    whole[0] = (uint8_t)status;
-    if (count)
-        memcpy(whole + 1, body, count);
-    if (status != TQD_STATUS_OK)
-        d->values.frames_refused++;
-    d->reply_bytes = tq_stuffed((uint8_t)(f->kind | TQ_REPLY), f->sequence, d->nonce, whole,
-                                (uint8_t)(count + 1), d->reply);
-    tq_device_send(d, d->reply, d->reply_bytes);
-}
-
-static inline const tqd_register *tq_device_register(uint8_t address)
-{
-    int n;
-    for (n = 0; n < TQD_REGISTERS; n++)
-        if (tqd_registers[n].address == address)
-            return &tqd_registers[n];
-    return NULL;
-}
-
-/* Whether every element of a value lies within its range. */
-static inline int tq_device_ranges(const tqd_register *r, const uint8_t *value)
-{
-    int n;
-    for (n = 0; n < r->length; n++) {
-        const tqd_range *range = &tqd_ranges[r->ranges + (r->each ? n : 0)];
-        float x = 0;
-        if (r->kind == TQD_FLOAT)
-            memcpy(&x, value + 4 * n, 4);
-        else if (r->bytes == 1)
-            x = value[n];
-        else if (r->bytes == 2)
-            x = (float)(value[2 * n] | value[2 * n + 1] << 8);
-        else
-            continue; /* all values of 32 and 64 bits are legal */
-        if (!(x >= range->low && x <= range->high))
-            return 0;
-    }
-    return 1;
 }
 
 /* --- Frames: commands -------------------------------------------------------------------------------- */
@@ -686,8 +674,11 @@ static inline int tq_device_apply(tq_device *d, const tqd_register *r, const uin
     int state = d->force.state;
     if ((r->access & TQD_IDLE_ONLY) && (state == TQ_ARMED || state == TQ_RUNNING || state == TQ_RELEASING))
         return TQD_STATUS_STATE;
-    if (r->address == TQD_COMMAND)
-        return tq_device_command(d, value[0]);
+    if (r->address == TQD_COMMAND) {
+        int status = tq_device_command(d, value[0]);
+        v->state = (uint8_t)d->force.state, v->cause = (uint8_t)d->force.cause;
+        return status;
+    }
     if (r->address == TQD_SAMPLES)
         return tq_device_queue(d, value, r->length);
     if ((r->address == TQD_SIMULATE || r->address == TQD_STROKE) && !d->board.simulated)
@@ -754,53 +745,6 @@ static inline void tq_device_look(tq_device *d, const tqd_register *r, uint8_t *
         v->corrections[6] = c->duration;
     }
     memcpy(value, (const uint8_t *)v + r->offset, (size_t)r->bytes * r->length);
-}
-
-static inline void tq_device_read(tq_device *d, const tq_frame *f)
-{
-    uint8_t body[TQ_MOST_BODY];
-    const tqd_register *r = f->length == 1 ? tq_device_register(f->body[0]) : NULL;
-    if (f->length != 1) {
-        tq_device_reply(d, f, TQD_STATUS_LENGTH, NULL, 0);
-    } else if (!r) {
-        tq_device_reply(d, f, TQD_STATUS_ADDRESS, f->body, 1);
-    } else if (!(r->access & TQD_READS)) {
-        tq_device_reply(d, f, TQD_STATUS_ACCESS, f->body, 1);
-    } else {
-        body[0] = r->address;
-        d->board.lock(d->board.context);
-        tq_device_look(d, r, body + 1);
-        d->board.unlock(d->board.context);
-        tq_device_reply(d, f, TQD_STATUS_OK, body, 1 + (size_t)r->bytes * r->length);
-    }
-}
-
-static inline void tq_device_write(tq_device *d, const tq_frame *f)
-{
-    uint8_t body[TQ_MOST_BODY];
-    const tqd_register *r = f->length ? tq_device_register(f->body[0]) : NULL;
-    size_t size = r ? (size_t)r->bytes * r->length : 0;
-    int status;
-    if (!f->length)
-        status = TQD_STATUS_LENGTH;
-    else if (!r)
-        status = TQD_STATUS_ADDRESS;
-    else if (!(r->access & TQD_WRITES))
-        status = TQD_STATUS_ACCESS;
-    else if (f->length != 1 + size)
-        status = TQD_STATUS_LENGTH;
-    else if (!tq_device_ranges(r, f->body + 1) || !tq_device_accepts(d, r->address, f->body + 1))
-        status = TQD_STATUS_RANGE;
-    else {
-        d->board.lock(d->board.context);
-        status = tq_device_apply(d, r, f->body + 1);
-        d->values.state = (uint8_t)d->force.state, d->values.cause = (uint8_t)d->force.cause;
-        d->board.unlock(d->board.context);
-    }
-    memcpy(body, f->body, f->length);
-    if (r && r->address == TQD_COMMAND && status == TQD_STATUS_OK)
-        body[1] = d->values.state;
-    tq_device_reply(d, f, status, body, status == TQD_STATUS_OK ? f->length : f->length ? 1 : 0);
 }
 
 /* --- Frames: uploads --------------------------------------------------------------------------------- */
@@ -881,79 +825,17 @@ static inline void tq_device_upload(tq_device *d, const tq_frame *f)
     tq_device_reply(d, f, status, body, sizeof body);
 }
 
-/* --- Frames ------------------------------------------------------------------------------------------ */
+/* --- The host ----------------------------------------------------------------------------------------- */
 
-/* A host says hello: what it has to know, and from which number on it counts. Nothing is armed by it; what
-   was armed is let go. */
-static inline void tq_device_greet(tq_device *d, const tq_frame *f)
+/* What was armed is let go, an upload ends, and nothing plays or is sent by itself. */
+static inline void tq_device_greeted(tq_device *d)
 {
-    uint8_t body[21];
-    float rate = TQ_TICK_HZ;
-    const tqd_values *v = &d->values;
-    if (f->length) {
-        tq_device_reply(d, f, TQD_STATUS_LENGTH, NULL, 0);
-        return;
-    }
-    d->board.lock(d->board.context);
     if (d->force.state == TQ_ARMED || d->force.state == TQ_RUNNING)
         tq_force_event(&d->force, TQ_FAILED, TQ_HOST_CHANGED);
-    if (!d->greeted) /* the moment of the first hello is not foreseen, either */
-        d->nonce = (uint32_t)tq_scene_mix((uint64_t)d->board.entropy << 32 | v->tick) | 1;
-    d->greeted = 1, d->heard = d->beat = v->tick;
+    d->beat = d->values.tick;
     d->values.source = TQD_SOURCE_NOTHING, d->samples_out = d->samples_in;
     d->values.event_rate = 0, d->record_every = 0, d->records_out = d->records_in;
     d->slot = -1;
-    d->board.unlock(d->board.context);
-    d->expected = (uint16_t)(f->sequence + 1);
-    memcpy(body, &v->who_am_i, 2), memcpy(body + 2, &v->firmware_version, 2);
-    memcpy(body + 4, &v->schema_hash, 8), memcpy(body + 12, &rate, 4);
-    body[16] = v->real_size;
-    memcpy(body + 17, &v->tick, 4);
-    tq_device_reply(d, f, TQD_STATUS_OK, body, sizeof body);
-}
-
-/* A good frame. */
-static inline void tq_device_frame(tq_device *d, const tq_frame *f)
-{
-    uint16_t check = (uint16_t)(tq_crc16(f->body, f->length) ^ f->kind);
-    d->values.frames_good++;
-    if (f->kind == TQ_HELLO) {
-        tq_device_greet(d, f);
-        return;
-    }
-    if (!d->greeted || f->nonce != d->nonce) {
-        tq_device_reply(d, f, TQD_STATUS_NONCE, NULL, 0);
-        return;
-    }
-    if (f->sequence == (uint16_t)(d->expected - 1) && check == d->replied && d->reply_bytes) {
-        d->heard = d->values.tick;
-        tq_device_send(d, d->reply, d->reply_bytes);
-        return;
-    }
-    if (f->sequence != d->expected) {
-        uint8_t kept[TQ_MOST_STUFFED];
-        size_t bytes = d->reply_bytes;
-        memcpy(kept, d->reply, bytes);
-        tq_device_reply(d, f, TQD_STATUS_SEQUENCE, NULL, 0);
-        memcpy(d->reply, kept, bytes), d->reply_bytes = bytes;
-        return;
-    }
-    d->heard = d->values.tick, d->expected++, d->replied = check;
-    switch (f->kind) {
-    case TQ_READ: tq_device_read(d, f); break;
-    case TQ_WRITE: tq_device_write(d, f); break;
-    case TQ_UPLOAD: tq_device_upload(d, f); break;
-    default: tq_device_reply(d, f, TQD_STATUS_KIND, NULL, 0); break;
-    }
-}
-
-/* Bytes from the host. */
-static inline void tq_device_received(tq_device *d, const uint8_t *bytes, size_t count)
-{
-    tq_frame frame;
-    for (; count; count--, bytes++)
-        if (tq_reader_take(&d->reader, *bytes, &frame))
-            tq_device_frame(d, &frame);
 }
 
 /* Sends records that are due, as long as there is room for a reply after them. */

@@ -1,4 +1,5 @@
-"""Starts an emulated device for those without a board: a process, or QEMU with the firmware."""
+"""Starts an emulated device or recorder for those without a board: a process, or QEMU with the
+firmware."""
 
 from __future__ import annotations
 
@@ -20,7 +21,6 @@ KINDS: tuple[Kind, ...] = ("process", "m7", "stm32")
 ROOT = Path(__file__).parents[2]
 _FIRMWARE = Path(__file__).parent
 _COMPILER = "arm-none-eabi-gcc"
-_START_S = 20.0
 # Of an UART whose samples of a bit are 16 clocks: what both sides bear together.
 _WORST_BAUD = 0.02
 
@@ -83,7 +83,9 @@ def check_baud(kind: Kind, baud: int) -> None:
         )
 
 
-def build_firmware(kind: Kind, file: Path, *, baud: int, simulated: bool = True) -> Path:
+def build_firmware(
+    kind: Kind, file: Path, *, baud: int, simulated: bool = True, recorder: bool = False
+) -> Path:
     """Compile the firmware of a board.
 
     Parameters
@@ -91,7 +93,9 @@ def build_firmware(kind: Kind, file: Path, *, baud: int, simulated: bool = True)
     file : Path
         To be written (ELF).
     simulated : bool
-        Whether a simulated hand takes the place of encoders and motors.
+        Whether a simulated hand, or simulated mechanics, take the place of encoders and motors.
+    recorder : bool
+        Whether it is a recorder's, not a cable device's.
 
     Raises
     ------
@@ -107,7 +111,7 @@ def build_firmware(kind: Kind, file: Path, *, baud: int, simulated: bool = True)
     folders = [_FIRMWARE, _FIRMWARE / "boards", ROOT / "rig/force", ROOT / "modeling/rendering"]
     command = [_COMPILER, "-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-mthumb"]
     command += ["-mfloat-abi=hard", *board.options, f"-DBAUD={baud}"]
-    command += ["-DTQ_SIMULATED"] * simulated
+    command += ["-DTQ_SIMULATED"] * simulated + ["-DTQ_RECORDER"] * recorder
     command += [f"-I{folder}" for folder in folders]
     command += ["-ffunction-sections", "-Wl,--gc-sections", "-nostartfiles", "-specs=nano.specs"]
     command += ["-T", str(_FIRMWARE / "boards" / f"{board.name}.ld")]
@@ -133,6 +137,8 @@ class Emulator:
         Of its port, which limits the records that it sends.
     port : int
         Of a TCP socket on this computer instead of a pseudo-terminal; 0 for none.
+    recorder : bool
+        Whether it is a recorder of surfaces, not a cable device.
 
     Attributes
     ----------
@@ -142,8 +148,10 @@ class Emulator:
         What QEMU runs.
     """
 
-    def __init__(self, kind: Kind, *, baud: int | None = None, port: int = 0) -> None:
-        self._kind = kind
+    def __init__(
+        self, kind: Kind, *, baud: int | None = None, port: int = 0, recorder: bool = False
+    ) -> None:
+        self._kind, self._recorder = kind, recorder
         self._baud = USUAL_BAUD[kind] if baud is None else baud
         self._port = port
         self._stack = ExitStack()
@@ -162,12 +170,14 @@ class Emulator:
         """
         check_baud(self._kind, self._baud)
         what: str = self._kind
+        program = "rig.device.process"
         if self._kind == "process":
-            compiled_device()
+            compiled_device()  # where it is, the recorder is, too
+            program = "rig.recorder.process" if self._recorder else program
         else:
             self.firmware = self._built()
             what = f"{BOARDS[self._kind].machine}:{self.firmware}"
-        command = [sys.executable, "-m", "rig.device.process", what]
+        command = [sys.executable, "-m", program, what]
         self._child = subprocess.Popen(
             [*command, str(self._baud), str(self._port)],
             stdin=subprocess.PIPE,
@@ -191,7 +201,9 @@ class Emulator:
                 "qemu-system-arm), or emulate process."
             )
         folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
-        return build_firmware(self._kind, folder / "firmware.elf", baud=self._baud)
+        return build_firmware(
+            self._kind, folder / "firmware.elf", baud=self._baud, recorder=self._recorder
+        )
 
     @property
     def pid(self) -> int:

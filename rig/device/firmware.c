@@ -1,11 +1,11 @@
-/* The device's program: rings of bytes, the tick, and a loop that sleeps. docs/device.md#porting
+/* The program of a device, or with TQ_RECORDER of a recorder: rings of bytes, the tick, and a loop that sleeps.
+   docs/device.md#porting
 
-   With TQ_SIMULATED a simulated hand takes the place of encoders and motors.
+   With TQ_SIMULATED a simulated hand, or simulated mechanics, take the place of encoders and motors.
 
    Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
 
 #include "board.h"
-#include "simulated.h"
 
 enum { RECEIVED = 1024, SENT = 4096 };
 
@@ -37,8 +37,8 @@ void firmware_tick(void)
     uint32_t before, after;
 #ifdef TQ_SIMULATED
     tq_simulated_before(&simulated, &device, pace);
-    before = board_clock(); /* the hand is none of the device's work */
-    tq_device_tick(&device, simulated.counts, 0, pace);
+    before = board_clock(); /* what is simulated is none of the device's work */
+    tq_device_tick(&device, simulated.counts, simulated.button, pace);
 #else
     uint16_t counts[TQ_MOTORS];
     before = board_clock();
@@ -103,7 +103,7 @@ int firmware_main(void)
     board.lock = lock, board.unlock = unlock;
     board_lock();
 #ifdef TQ_SIMULATED
-    board.cables = tq_usual_cables(), board.simulated = 1;
+    tq_simulated_board(&board), board.simulated = 1;
     tq_simulated_start(&simulated, 0);
 #endif
     board_begin(&board);

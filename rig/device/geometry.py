@@ -92,7 +92,8 @@ class CableGeometry:
         """Of both cables for a tool at (x, z), (…, 2) to (…, 2)."""
         place = np.asarray(place_mm, dtype=np.float64)
         along = place[..., :1] + np.array([self.half_mm, -self.half_mm])
-        return np.hypot(along, place[..., 1:])
+        lengths: Floats = np.hypot(along, place[..., 1:])
+        return lengths
 
     def place_mm(self, lengths_mm: ArrayLike) -> Floats:
         """Where the tool is for these lengths, (…, 2) to (…, 2).
@@ -128,7 +129,8 @@ class CableGeometry:
     def force_n(self, place_mm: ArrayLike, tensions_n: ArrayLike) -> Floats:
         """Of cables on the tool, −Aᵀ t, (…, 2)."""
         tensions = np.asarray(tensions_n, dtype=np.float64)
-        return -np.einsum("...ji,...j->...i", self.jacobian(place_mm), tensions)
+        force: Floats = -np.einsum("...ji,...j->...i", self.jacobian(place_mm), tensions)
+        return force
 
     def exact_tensions_n(self, place_mm: ArrayLike, force_n: ArrayLike) -> Floats:
         """The only tensions that give a force, (…, 2); negative where a cable had to push."""

@@ -30,13 +30,19 @@ def main() -> None:
     kind, baud, port = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the input's end is what ends it
     if kind == "process":
-        _run(VirtualBoard(entropy=int.from_bytes(os.urandom(4)), baud=baud), port)
+        run_board(VirtualBoard(entropy=new_entropy(), baud=baud), port)
     else:
         machine, firmware = kind.split(":", 1)
         _run_qemu(machine, firmware, port)
 
 
-def _run(board: VirtualBoard, port: int) -> None:
+def new_entropy() -> int:
+    """Of a board's start."""
+    return int.from_bytes(os.urandom(4))
+
+
+def run_board(board: VirtualBoard, port: int) -> None:
+    """Say where it is reached, and let it run until the input ends."""
     if port:
         _serve(board, port)
     else:

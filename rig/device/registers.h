@@ -10,7 +10,7 @@
 
 #define TQD_WHO_AM_I_VALUE 29012
 #define TQD_FIRMWARE_VERSION_VALUE 257
-#define TQD_SCHEMA_HASH_VALUE UINT64_C(0xb9d03be05edbe318)
+#define TQD_SCHEMA_HASH_VALUE UINT64_C(0x47ec6215b790392c)
 
 /* Addresses. */
 enum {
@@ -77,6 +77,7 @@ enum {
     TQD_STROKE = 65,
     TQD_SIMULATED = 66,
     TQD_HOMED = 67,
+    TQD_EMERGED = 68,
 };
 
 /* States of rig/force/force.h; there is force in ARMED (a wall ramps out), RUNNING and RELEASING only. */
@@ -119,6 +120,7 @@ enum {
     TQD_CAUSE_LINK = 14, /* no good frame for 100 ms */
     TQD_CAUSE_HOST = 15, /* another host, or the same one anew, said hello */
     TQD_CAUSE_STUCK = 16, /* one encoder stood still while the other one went on for 3 mm */
+    TQD_CAUSE_SLACK = 17, /* a cable carried less than half of what it is to pull with for 20 ms, by the estimate from its motor */
 };
 
 /* What the vibrator plays. */
@@ -138,6 +140,8 @@ enum {
     TQD_SIMULATION_BROWN_OUT = 5, /* the processor starts anew */
     TQD_SIMULATION_MOTOR = 6, /* the left motor does not take its value */
     TQD_SIMULATION_UNPLUGGED = 7, /* the encoders read 0 */
+    TQD_SIMULATION_SLACK = 8, /* the left cable is cut */
+    TQD_SIMULATION_BUTTON = 9, /* the button is down, and the hand goes on to the real surface */
 };
 
 /* First byte of every reply. */
@@ -161,10 +165,11 @@ enum {
 enum {
     TQD_FLAGS_CONTACT = 1, /* the force is at least ContactForce */
     TQD_FLAGS_BUTTON = 2,
-    TQD_FLAGS_CLIPPED = 4, /* a current was lower than the force needs, since its motor was hot or at its limit */
+    TQD_FLAGS_CLIPPED = 4, /* the cables do not give the force: a tension beyond its limit or its motor's, below the least one, or outside the cone */
     TQD_FLAGS_BEYOND = 8, /* below the wall's height but not on it */
     TQD_FLAGS_EMPTY = 16, /* the host's samples had run out */
     TQD_FLAGS_SIMULATED = 32, /* the board is simulated */
+    TQD_FLAGS_SLACK = 64, /* a cable carries less than half of what it is to pull with, by the estimate from its motor */
 };
 
 /* What they hold. */
@@ -215,6 +220,7 @@ typedef struct {
     uint32_t samples_missed;
     uint32_t ticks_late;
     uint32_t tick_clocks[2];
+    float emerged[10];
     float stroke[3];
     uint16_t who_am_i;
     uint16_t firmware_version;
@@ -276,7 +282,7 @@ static const tqd_range tqd_ranges[] = {
     { 1.0f, 32.0f }, /* SpeedDelay */
     { 1e-06f, 1000000.0f }, /* VibrationScale */
     { -1000000.0f, 1000000.0f }, /* Weighting */
-    { 0.0f, 7.0f }, /* Simulate */
+    { 0.0f, 9.0f }, /* Simulate */
     { 0.0f, 150.0f }, /* Stroke */
     { 0.0f, 5.0f }, /* Stroke */
     { 0.0f, 30.0f }, /* Stroke */
@@ -346,8 +352,9 @@ static const tqd_register tqd_registers[] = {
     { TQD_STROKE, TQD_FLOAT, 4, 3, TQD_READS | TQD_WRITES, 27, 1, offsetof(tqd_values, stroke) },
     { TQD_SIMULATED, TQD_INTEGER, 1, 1, TQD_READS, 0, 0, offsetof(tqd_values, simulated) },
     { TQD_HOMED, TQD_INTEGER, 1, 1, TQD_READS, 0, 0, offsetof(tqd_values, homed) },
+    { TQD_EMERGED, TQD_FLOAT, 4, 10, TQD_READS, 0, 0, offsetof(tqd_values, emerged) },
 };
 
-enum { TQD_REGISTERS = 63 };
+enum { TQD_REGISTERS = 64 };
 
 #endif

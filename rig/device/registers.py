@@ -51,6 +51,7 @@ class DeviceCause(IntEnum):
     LINK = 14
     HOST = 15
     STUCK = 16
+    SLACK = 17
 
 
 class DeviceSource(IntEnum):
@@ -72,6 +73,8 @@ class DeviceSimulation(IntEnum):
     BROWN_OUT = 5
     MOTOR = 6
     UNPLUGGED = 7
+    SLACK = 8
+    BUTTON = 9
 
 
 class DeviceStatus(IntEnum):
@@ -101,3 +104,4 @@ class DeviceFlags(IntFlag):
     BEYOND = 8
     EMPTY = 16
     SIMULATED = 32
+    SLACK = 64

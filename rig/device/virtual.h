@@ -61,8 +61,8 @@ static inline void tq_virtual_start(tq_virtual *v, uint32_t entropy, uint32_t ba
     memset(&board, 0, sizeof board);
     board.context = v, board.write = tq_virtual_write, board.room = tq_virtual_room;
     board.send = tq_virtual_send, board.lock = board.unlock = tq_virtual_nothing;
-    board.cables = tq_usual_cables();
-    board.entropy = entropy, board.baud = baud, board.simulated = 1, board.most_g = 20;
+    tq_simulated_board(&board);
+    board.entropy = entropy, board.baud = baud, board.simulated = 1;
     tq_simulated_start(&v->simulated, 0);
     tq_device_start(&v->device, &board);
 }
@@ -78,7 +78,7 @@ static inline void tq_virtual_step(tq_virtual *v, size_t ticks)
 {
     for (; ticks; ticks--) {
         tq_simulated_before(&v->simulated, &v->device, 1);
-        tq_device_tick(&v->device, v->simulated.counts, 0, 1);
+        tq_device_tick(&v->device, v->simulated.counts, v->simulated.button, 1);
         tq_device_poll(&v->device);
     }
 }
@@ -94,10 +94,10 @@ static inline size_t tq_virtual_take(tq_virtual *v, uint8_t *out, size_t most)
     return n;
 }
 
-/* What the vibrator's converter was given last. */
-static inline double tq_virtual_converted(const tq_virtual *v)
+/* What an output was told last. */
+static inline double tq_virtual_given(const tq_virtual *v, int output)
 {
-    return (double)v->simulated.converted;
+    return (double)v->simulated.given[output];
 }
 
 /* Every output off. */

@@ -40,10 +40,12 @@ class VirtualBoard:
         Another one for another start, 0 … 2³² − 1.
     baud : int
         Of its port; 0 for any.
+    module : module
+        The compiled firmware; without it that of the cable device.
     """
 
-    def __init__(self, *, entropy: int = 1, baud: int = 0) -> None:
-        module = compiled_device()
+    def __init__(self, *, entropy: int = 1, baud: int = 0, module: Any = None) -> None:
+        module = compiled_device() if module is None else module
         self.ffi, self.lib = module.ffi, module.lib
         self._memory = self.ffi.new("char[]", self.lib.tq_virtual_size())
         self.address = self.ffi.cast("tq_virtual *", self._memory)
@@ -59,10 +61,9 @@ class VirtualBoard:
         """
         return int(self.lib.tq_virtual_run(self.address, port, end, other))
 
-    @property
-    def converted(self) -> float:
-        """What the vibrator's converter was given last."""
-        return float(self.lib.tq_virtual_converted(self.address))
+    def given(self, output: int) -> float:
+        """What a motor or the vibrator's converter was told last."""
+        return float(self.lib.tq_virtual_given(self.address, output))
 
     def shut(self) -> None:
         """Every output off."""

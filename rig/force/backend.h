@@ -15,6 +15,18 @@
 #endif
 typedef TQ_NUMBER tq_number;
 
+#ifdef TQ_FREESTANDING
+#define TQ_ROOT_SINGLE __builtin_sqrtf
+#define TQ_ROOT_DOUBLE __builtin_sqrt
+#else
+#include <math.h>
+#define TQ_ROOT_SINGLE sqrtf
+#define TQ_ROOT_DOUBLE sqrt
+#endif
+#define TQ_ROOT(x)                                                                     \
+    (sizeof(tq_number) == sizeof(float) ? (tq_number)TQ_ROOT_SINGLE((float)(x))          \
+                                        : (tq_number)TQ_ROOT_DOUBLE((double)(x)))
+
 /* One reading. A device that cannot say where it is sets `failed`; the servo then ramps its force to 0 and
    stays there. What the position is worth (NaN, a jump, the same for too long) is the servo's to judge. */
 typedef struct {

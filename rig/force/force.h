@@ -21,7 +21,7 @@ enum {
     TQ_NO_CAUSE, TQ_NOT_READ, TQ_NOT_A_NUMBER, TQ_LATE, TQ_JUMP, TQ_SPEED, TQ_WORKSPACE, TQ_FROZEN,
     TQ_HEARTBEAT_LOST, TQ_SOUND_LOST, TQ_WATCHDOG_LOST, TQ_NOT_WRITTEN, TQ_STOPPED,
     TQ_STOOD_STILL, /* by the watchdog: the servo itself */
-    TQ_LINK_LOST, TQ_HOST_CHANGED, TQ_STUCK, /* by a device that renders by itself */
+    TQ_LINK_LOST, TQ_HOST_CHANGED, TQ_STUCK, TQ_SLACK, /* by a device that renders by itself */
     TQ_CAUSES
 };
 
@@ -83,6 +83,7 @@ typedef struct {
     tq_number raw_mm[3]; /* the last reading */
     int sensed;       /* whether there is one */
     int engaged;      /* whether the tool came onto the wall from above */
+    int off;          /* whoever holds the tool has switched the wall off */
 } tq_force;
 
 static inline tq_number tq_force_size(tq_number x)
@@ -185,10 +186,10 @@ static inline tq_number tq_wall_force(tq_force *f, tq_number step_s)
 {
     int inside = tq_force_size(f->position_mm[0]) <= f->wall.half_x_mm
                  && tq_force_size(f->position_mm[1]) <= f->wall.half_y_mm;
-    tq_number wanted = f->state == TQ_RUNNING ? 1 : 0, most = step_s / f->limits.show_s, force;
+    tq_number wanted = f->state == TQ_RUNNING && !f->off ? 1 : 0, most = step_s / f->limits.show_s, force;
     f->scale += tq_force_limited(wanted - f->scale, most);
-    f->engaged = f->depth_mm <= 0 || (f->engaged && inside);
-    f->beyond = f->state == TQ_RUNNING && f->depth_mm > 0 && !f->engaged;
+    f->engaged = f->depth_mm <= 0 || (f->engaged && inside && !(f->off && f->scale <= 0));
+    f->beyond = f->state == TQ_RUNNING && !f->off && f->depth_mm > 0 && !f->engaged;
     if (!f->engaged || f->depth_mm <= 0 || f->scale <= 0)
         return 0;
     force = f->scale * (f->wall.stiffness_n_per_mm * f->depth_mm

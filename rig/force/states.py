@@ -49,6 +49,7 @@ class Cause(IntEnum):
     LINK = 14
     HOST = 15
     STUCK = 16
+    SLACK = 17
 
 
 class Ask(IntEnum):
@@ -90,6 +91,8 @@ SENTENCES = {
     "it.",
     Cause.STUCK: "expected both encoders of the device to move, got one that stands still; check "
     "its cable.",
+    Cause.SLACK: "expected both cables of the device to pull, got one that is slack; lift the tool "
+    "more slowly, or check its cables.",
     Cause.STOPPED: "the force device was stopped.",
 }
 

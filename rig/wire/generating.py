@@ -88,8 +88,8 @@ def c_header(definition: Definition) -> str:
     return "\n".join(lines) + "\n"
 
 
-def python_module(definition: Definition) -> str:
-    """Its masks as enumerations."""
+def python_module(definition: Definition, prefix: str = "Device") -> str:
+    """Its masks as enumerations, whose names begin with this."""
     lines = [
         f'"""What registers of {definition.name} hold.',
         "",
@@ -98,10 +98,10 @@ def python_module(definition: Definition) -> str:
         "",
         "from __future__ import annotations",
         "",
-        "from enum import IntEnum, IntFlag",
+        "from enum import IntEnum" + ", IntFlag" * any(m.bits for m in definition.masks.values()),
     ]
     for mask in definition.masks.values():
-        lines += ["", "", f"class Device{mask.name}({'IntFlag' if mask.bits else 'IntEnum'}):"]
+        lines += ["", "", f"class {prefix}{mask.name}({'IntFlag' if mask.bits else 'IntEnum'}):"]
         lines += [f'    """{mask.description.split(";")[0].rstrip(".")}."""', ""]
         lines += [f"    {name} = {value}" for name, (value, _) in mask.members.items()]
     return "\n".join(lines) + "\n"

@@ -6,12 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from tactileq.commands.analyze import read_answers
 from tactileq.commands.simulate import run_study
 from tactileq.commands.stimuli import render_set
 from tactileq.demo_benches import Benches, begun_scenes, reported
+from tactileq.demo_parts import JOBS, demo_population, modelled
 from tactileq.options import Out, Seed
 from tactileq.own_results import check_own_results
 from tactileq.printing import progress, share_of
@@ -20,21 +23,33 @@ from tactileq.workers import mapping
 if TYPE_CHECKING:
     from analysis.page.sections import Mapped, Section
     from analysis.textures.results import TextureResult
-    from experiments.observers.psychometrics import Psychometrics
     from modeling import ARModel, Threshold
     from stimuli.sets.recipe import Recipe
 
-JOBS = 2
-# Points by which simulated participants rate simplified models lower; no points elsewhere. So many
-# that the tests find them in 39 of 40 simulations (12 points: in 32).
-PLANTED_TEXTURE, PLANTED_POINTS = "PVC", -15.0
 
-
-def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
+def demo(
+    out: Out = Path("demo"),
+    seed: Seed = 1,
+    device: Annotated[
+        bool,
+        typer.Option(
+            "--device",
+            help="On simulated devices: a recorder records, hands stroke the cable device's wall.",
+        ),
+    ] = False,
+) -> None:
     """The whole study in silico: record, model, simplify, render, ask, analyze.
+
+    With --device everything goes through the firmware of the recorder and of the cable device, in
+    virtual time: fewer participants, whose simulated hands really move.
 
     Example: tactileq demo --out demo
     """
+    if device:
+        from tactileq.commands.demo_device import demo_on_devices
+
+        demo_on_devices(out, seed)
+        return
     from experiments.study.models import ModelSets
     from experiments.study.study import Study
     from modeling import Threshold
@@ -102,15 +117,6 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
     print((out / "report.html").resolve())
 
 
-def demo_population(textures: Sequence[str]) -> Psychometrics:
-    """People to whom simplified models differ in the magnitude of one texture, and nowhere else."""
-    from experiments.observers.psychometrics import RATED_SCALES, Psychometrics
-
-    planted = {texture: dict.fromkeys(RATED_SCALES, 0.0) for texture in textures}
-    planted[PLANTED_TEXTURE]["magnitude_similarity"] = PLANTED_POINTS
-    return Psychometrics(planted=planted)
-
-
 def demo_recipe(folder: Path, *, seed: int) -> Recipe:
     """One second of every full and simplified model of the demo at 150 mm/s and 1.5 N."""
     from stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
@@ -126,23 +132,12 @@ def demo_recipe(folder: Path, *, seed: int) -> Recipe:
 
 def demo_texture(name: str, folder: Path, *, threshold: Threshold, seed: int) -> TextureResult:
     """Record, model and simplify one planted texture; everything goes by way of the disk."""
-    from analysis.textures.results import TextureResult
-    from modeling import RecordingSet, fit_texture
-    from modeling import simplify as drop_layers
     from modeling.files.writing import file_stem
-    from modeling.perception.verdicts import ENDING
     from stimuli.planted.textures import RECORDER_RATE_HZ, planted_texture, record_texture
 
     truth = planted_texture(name, rate_hz=RECORDER_RATE_HZ)
-    place = folder / "recordings" / file_stem(name)
-    record_texture(truth, seed=seed).save(place)
-    records = RecordingSet.load(place)
-    full = fit_texture(records)
-    simplification = drop_layers(full, threshold)
-    full.save(folder / "models" / f"{file_stem(name)}.json")
-    simplification.model.save(folder / "simplified" / f"{file_stem(name)}.json")
-    simplification.save(folder / "simplified" / f"{file_stem(name)}{ENDING}")
-    return TextureResult(records, full, simplification, truth)
+    record_texture(truth, seed=seed).save(folder / "recordings" / file_stem(name))
+    return modelled(name, folder, threshold=threshold, truth=truth)
 
 
 def with_checks(result: TextureResult) -> tuple[TextureResult, ARModel]:

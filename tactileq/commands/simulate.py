@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from experiments.study.models import ModelSets
     from experiments.study.study import Study
     from modeling import TextureModel, Threshold
+    from rig.interface import TextureRig
 
 
 def simulate(
@@ -103,8 +104,9 @@ def run_study(
     seed: int,
     psychometrics: Psychometrics | None = None,
     sources: Mapping[str, str] | None = None,
+    rig: TextureRig | None = None,
 ) -> None:
-    """Simulate all participants of a study at the simulated rig, with a progress bar."""
+    """Simulate all participants of a study with a progress bar, by default at `SimulatedRig`."""
     from experiments.observers.whole_study import simulate_study
     from rig.twin import SimulatedRig
 
@@ -115,7 +117,7 @@ def run_study(
             plan,
             real=real,
             models=models,
-            rig=SimulatedRig(real, seed=seed),
+            rig=SimulatedRig(real, seed=seed) if rig is None else rig,
             data_folder=data,
             seed=seed,
             threshold=threshold,

@@ -105,10 +105,10 @@ def chance(table: pd.DataFrame, claim: str, texture: str, *, n: int, verdict: st
 
 def test_any_number_of_workers_gives_the_same_tables(study: Study, models: ModelSets):
     who = people(study, models, most=8)
-    tables = [chances(who, (4, 8), simulations=4, seed=3, jobs=jobs) for jobs in (1, 2)]
+    tables = [chances(who, (4, 8), simulations=2, seed=3, jobs=jobs) for jobs in (1, 2)]
     assert tables[0].equals(tables[1])
     assert list(tables[0]) == [column.name for column in POWER_COLUMNS]
-    work = partial(simulate_cell, simulations=120, seed=7)
+    work = partial(simulate_cell, simulations=40, seed=7)
     rows = cells(["TOST, no guard on ends"], sizes=[8])
     found = []
     for jobs in (1, 2):
@@ -120,7 +120,7 @@ def test_any_number_of_workers_gives_the_same_tables(study: Study, models: Model
 def test_the_rule_of_the_plan_decides_with_any_number_of_workers(study: Study, models: ModelSets):
     who = people(by_model(study, RATED, ODD), models, most=10)
     tables = [
-        chances(who, (8, 10), simulations=4, seed=3, jobs=jobs, effort=BRIEF) for jobs in (1, 2)
+        chances(who, (8, 10), simulations=2, seed=3, jobs=jobs, effort=BRIEF) for jobs in (1, 2)
     ]
     assert tables[0].equals(tables[1])
     table = tables[0]
@@ -129,7 +129,7 @@ def test_the_rule_of_the_plan_decides_with_any_number_of_workers(study: Study, m
         of_claim = table[table["claim"] == claim.name]
         assert set(of_claim["texture"]) == places
         overall = of_claim[of_claim["texture"] == ALL_TEXTURES]
-        assert list(overall.groupby("n")["hits"].sum()) == [4, 4]
+        assert list(overall.groupby("n")["hits"].sum()) == [2, 2]
     single = table[table["texture"].isin(TEXTURES) & (table["hits"] > 0)]
     assert not {EQUIVALENT, WITHIN_BOUNDS} & set(single["verdict"])
     alone = table[table["texture"] == MEAN_ALONE]

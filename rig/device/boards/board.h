@@ -5,17 +5,22 @@
 #ifndef TQ_BOARD_H
 #define TQ_BOARD_H
 
-#include "device.h"
+#ifdef TQ_RECORDER
+#include "../../recorder/simulated.h"
+#else
+#include "simulated.h"
+#endif
 
 /* --- To be written ------------------------------------------------------------------------------- */
 
 /* Clocks, pins, motors off, the UART with its interrupt, a timer with another one 5000 times a second,
-   whose priority is the lower one. Fills in cables, baud, most_g and
-   entropy. */
+   whose priority is the lower one. Fills in baud and entropy, of a cable device cables and most_g, too. */
 void board_begin(tq_board *board);
-/* A motor's current (A) or the vibrator's acceleration (g); not 0 where a driver reports a fault. */
+/* A motor's current (A), of a recorder in both directions, or the vibrator's acceleration (g); not 0 where a
+   driver reports a fault. */
 int board_write(int output, tq_number value);
-/* The encoders' counters, modulo 2^16, and whether the button is down. */
+/* The encoders' counters, modulo 2^16, and whether the button is down; of a recorder 1 while a mark is seen, and
+   2 more where it is the index. */
 void board_counts(uint16_t counts[TQ_MOTORS]);
 int board_button(void);
 /* Bytes wait to be sent: start, and take them one by one from firmware_next. Called with interrupts off. */

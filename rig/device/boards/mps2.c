@@ -41,7 +41,7 @@ static void byte_left(void)
 
 void board_begin(tq_board *board)
 {
-    board->baud = BAUD, board->entropy = start_number(), board->most_g = 20;
+    board->baud = BAUD, board->entropy = start_number();
     UART_DIVISOR = HZ / BAUD;
     UART_CONTROL = 15; /* both ways, with an interrupt each */
     INTERRUPTS_ON(0);
@@ -57,7 +57,7 @@ int board_write(int output, tq_number value)
 
 void board_counts(uint16_t counts[TQ_MOTORS])
 {
-    counts[TQ_LEFT] = counts[TQ_RIGHT] = 0;
+    counts[0] = counts[1] = 0;
 }
 
 int board_button(void)

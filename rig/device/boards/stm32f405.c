@@ -2,7 +2,9 @@
 
    pins: PA9, PA10 UART 1; PC6, PC7 left encoder (timer 3); PB6, PB7 right encoder (timer 4); PC8, PC9 PWM of
    the left and the right motor's current (timer 8); PA4 vibrator (DAC 1); PC0 enables the motor drivers, PC1
-   is low where one reports a fault; PB0 is the button, low while it is down. Registers: RM0090.
+   is low where one reports a fault; PB0 is the button, low while it is down. Of a recorder the turntable is left
+   and the contactor right; PC10, PC11 are high where their currents flow backwards, PB0 is low at a mark and PB1 at
+   the index, from before its mark on. Registers: RM0090.
 
    Compiled and run in QEMU, which has no motors; tried on no hardware.
 
@@ -30,7 +32,9 @@ enum { STATE = 0x00, DATA = 0x04, DIVISOR = 0x08, CONTROL = 0x0C };
 enum { CAME = 1u << 5, EMPTY = 1u << 7 }; /* in the UART's state; in its control they ask for an interrupt */
 
 #define AMPERES_AT_FULL ((tq_number)6) /* of the motor driver at the whole PWM: set it for yours */
+#ifndef TQ_RECORDER
 #define STEPS_PER_G ((tq_number)200)   /* of the DAC; VibrationScale corrects it */
+#endif
 
 /* Until a bit is set; not for ever, since an emulator may not know it. */
 static void wait_for(volatile uint32_t *where, uint32_t bit)
@@ -71,7 +75,13 @@ static void begin_pins(void)
     enum { IN = 0, OUT = 1, OTHER = 2, ANALOG = 3 };
     set_pin('C', 0, OUT, 0), GPIO('C', SETS) = 1u << 16; /* drivers off */
     GPIO('B', PULL) |= 1u, GPIO('C', PULL) |= 1u << 2;
-    set_pin('B', 0, IN, 0), set_pin('C', 1, IN, 0), set_pin('A', 4, ANALOG, 0);
+    set_pin('B', 0, IN, 0), set_pin('C', 1, IN, 0);
+#ifdef TQ_RECORDER
+    GPIO('B', PULL) |= 1u << 2;
+    set_pin('B', 1, IN, 0), set_pin('C', 10, OUT, 0), set_pin('C', 11, OUT, 0);
+#else
+    set_pin('A', 4, ANALOG, 0);
+#endif
     set_pin('A', 9, OTHER, 7), set_pin('A', 10, OTHER, 7);
     set_pin('C', 6, OTHER, 2), set_pin('C', 7, OTHER, 2), set_pin('B', 6, OTHER, 2), set_pin('B', 7, OTHER, 2);
     set_pin('C', 8, OTHER, 3), set_pin('C', 9, OTHER, 3);
@@ -126,17 +136,20 @@ void board_begin(tq_board *board)
     begin_clocks();
     begin_pins();
 #ifndef TQ_SIMULATED
-    board->cables = tq_usual_cables();
     begin_encoder(TIMER_3), begin_encoder(TIMER_4);
 #endif
     begin_motors();
+#ifdef TQ_RECORDER
+    board->most_a = (float)AMPERES_AT_FULL;
+#else
+    board->cables = tq_usual_cables(), board->most_g = 2047 / (float)STEPS_PER_G;
     DAC(0x00) = 1, DAC(0x08) = 2048;
+#endif
     UART(DIVISOR) = (APB2_HZ + BAUD / 2) / BAUD;
     UART(CONTROL) = 1u << 13 | 1u << 3 | 1u << 2 | CAME;
     INTERRUPTS_ON(UART_IRQ);
     begin_ticks(HZ);
     board->baud = BAUD, board->entropy = start_number();
-    board->most_g = 2047 / (float)STEPS_PER_G;
 #ifndef TQ_SIMULATED /* which QEMU does not know */
     board->entropy ^= UNIQUE_ID;
 #endif
@@ -144,13 +157,18 @@ void board_begin(tq_board *board)
 
 int board_write(int output, tq_number value)
 {
+#ifdef TQ_RECORDER
+    GPIO('C', SETS) = 1u << (10 + output) << (value < 0 ? 0 : 16);
+    value = value < 0 ? -value : value;
+#else
     if (output == TQ_VIBRATOR) {
         tq_number steps = (tq_number)2048.5 + STEPS_PER_G * value;
         DAC(0x08) = (uint32_t)(steps < 0 ? 0 : steps > 4095 ? 4095 : steps);
         return 0;
     }
+#endif
     value = value < 0 ? 0 : value > AMPERES_AT_FULL ? AMPERES_AT_FULL : value;
-    TIMER(TIMER_8, output == TQ_LEFT ? 0x3C : 0x40) = (uint32_t)(value / AMPERES_AT_FULL * PWM_STEPS);
+    TIMER(TIMER_8, output == 0 ? 0x3C : 0x40) = (uint32_t)(value / AMPERES_AT_FULL * PWM_STEPS);
 #ifdef TQ_SIMULATED
     return 0;
 #else
@@ -160,13 +178,15 @@ int board_write(int output, tq_number value)
 
 void board_counts(uint16_t counts[TQ_MOTORS])
 {
-    counts[TQ_LEFT] = (uint16_t)TIMER(TIMER_3, 0x24), counts[TQ_RIGHT] = (uint16_t)TIMER(TIMER_4, 0x24);
+    counts[0] = (uint16_t)TIMER(TIMER_3, 0x24), counts[1] = (uint16_t)TIMER(TIMER_4, 0x24);
 }
 
 int board_button(void)
 {
 #ifdef TQ_SIMULATED
     return 0;
+#elif defined TQ_RECORDER
+    return (int)(~GPIO('B', INPUT) & 3u);
 #else
     return !(GPIO('B', INPUT) & 1u);
 #endif
