@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from analysis.textures.results import TextureResult
     from experiments.observers.psychometrics import Psychometrics
+    from experiments.study.models import ModelSets
     from modeling import TextureModel, Threshold
 
 JOBS = 2
@@ -43,3 +44,16 @@ def modelled(
     simplification.model.save(folder / "simplified" / f"{file_stem(name)}.json")
     simplification.save(folder / "simplified" / f"{file_stem(name)}{ENDING}")
     return TextureResult(records, full, simplification, truth)
+
+
+def presented(made: Sequence[TextureResult]) -> tuple[ModelSets, dict[str, TextureModel]]:
+    """What the virtual surfaces present, and the truth behind the real ones, by texture."""
+    from experiments.study.models import ModelSets
+
+    models = ModelSets(
+        sets={
+            "full": {r.texture: r.model for r in made},
+            "simplified": {r.texture: r.simplification.model for r in made},
+        }
+    )
+    return models, {r.texture: r.truth for r in made if r.truth is not None}

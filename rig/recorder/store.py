@@ -143,7 +143,7 @@ class RecorderStore:
         self.damaged = list(
             unusable_recordings(self.folder, plan.texture) if self._recorded else ()
         )
-        known = {self._condition_of(row) for row in self._typed_rows() if self._is_ours(row)}
+        known = {self._condition_of(row) for _, row in self._read() if self._is_ours(row)}
         if gone := len(self._recorded - known) if (self.folder / PLAN_NAME).is_file() else 0:
             self.damaged.append(
                 f"expected a row of {TABLE_NAME} for each recording of {plan.texture} in "
@@ -183,24 +183,19 @@ class RecorderStore:
 
     def rows(self) -> list[Mapping[str, object]]:
         """The table as it is, without the row of a record that a killed run did not add."""
-        table = self.folder / TABLE_NAME
-        if not table.is_file():
-            return []
-        kept: list[Mapping[str, object]] = []
-        for where, row in read_cells(table, RECORDER_COLUMNS):
-            values = typed(row, RECORDER_COLUMNS, where)
-            if not (self._is_ours(values) and self._condition_of(values) not in self._recorded):
-                kept.append(row)
-        return kept
-
-    def _typed_rows(self) -> list[Mapping[str, Any]]:
-        table = self.folder / TABLE_NAME
-        if not table.is_file():
-            return []
         return [
-            typed(row, RECORDER_COLUMNS, where)
-            for where, row in read_cells(table, RECORDER_COLUMNS)
+            row
+            for row, values in self._read()
+            if not self._is_ours(values) or self._condition_of(values) in self._recorded
         ]
+
+    def _read(self) -> list[tuple[Mapping[str, object], Mapping[str, Any]]]:
+        """The rows of the table, each as its text and as what it says."""
+        table = self.folder / TABLE_NAME
+        if not table.is_file():
+            return []
+        rows = read_cells(table, RECORDER_COLUMNS)
+        return [(row, typed(row, RECORDER_COLUMNS, where)) for where, row in rows]
 
     def _is_ours(self, row: Mapping[str, Any]) -> bool:
         return (row["texture"], row["repeat"]) == (self.plan.texture, self.plan.repeat)

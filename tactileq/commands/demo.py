@@ -14,7 +14,7 @@ from tactileq.commands.analyze import read_answers
 from tactileq.commands.simulate import run_study
 from tactileq.commands.stimuli import render_set
 from tactileq.demo_benches import Benches, begun_scenes, reported
-from tactileq.demo_parts import JOBS, demo_population, modelled
+from tactileq.demo_parts import JOBS, demo_population, modelled, presented
 from tactileq.options import Out, Seed
 from tactileq.own_results import check_own_results
 from tactileq.printing import progress, share_of
@@ -50,7 +50,6 @@ def demo(
 
         demo_on_devices(out, seed)
         return
-    from experiments.study.models import ModelSets
     from experiments.study.study import Study
     from modeling import Threshold
     from modeling.files.folders import replace_folder
@@ -73,13 +72,7 @@ def demo(
         # Other processes check the models while this one presents them.
         checked, scenes = mapped(with_checks, made), begun_scenes(mapped, made)
         render_set(demo_recipe(fresh, seed=seed), fresh / "stimuli")
-        models = ModelSets(
-            sets={
-                "full": {r.texture: r.model for r in made},
-                "simplified": {r.texture: r.simplification.model for r in made},
-            }
-        )
-        real = {r.texture: r.truth for r in made if r.truth is not None}
+        models, real = presented(made)
         population = demo_population(plan.textures)
         run_study(
             plan,

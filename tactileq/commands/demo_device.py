@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from tactileq.commands.analyze import read_answers
 from tactileq.commands.simulate import run_study
 from tactileq.demo_benches import reported
-from tactileq.demo_parts import JOBS, demo_population, modelled
+from tactileq.demo_parts import JOBS, demo_population, modelled, presented
 from tactileq.own_results import check_own_results
 from tactileq.printing import progress, share_of
 from tactileq.workers import mapping
@@ -36,7 +36,6 @@ def demo_on_devices(out: Path, seed: int, study: Study | None = None) -> None:
     from analysis.report.report import write_report
     from benches.recorder.section import recorder_section
     from benches.recorder.tables import near_table, records_of
-    from experiments.study.models import ModelSets
     from modeling import Threshold
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
@@ -61,13 +60,7 @@ def demo_on_devices(out: Path, seed: int, study: Study | None = None) -> None:
         with progress("Recording, modeling, simplifying", len(textures)) as advance:
             done = list(reported(mapped(record, textures), advance, lambda one: one[0].texture))
         made = [result for result, _ in done]
-        models = ModelSets(
-            sets={
-                "full": {r.texture: r.model for r in made},
-                "simplified": {r.texture: r.simplification.model for r in made},
-            }
-        )
-        real = {r.texture: r.truth for r in made if r.truth is not None}
+        models, real = presented(made)
         population = demo_population(textures)
         run_study(
             plan,

@@ -41,7 +41,6 @@ class RecorderRecording:
 
 def record_on_recorder(folder: Path, recorder: str, options: RecorderRecording) -> None:
     """Record what the folder misses, until nothing is missing."""
-    from rig.desk.lock import rig_locked
     from rig.recorder.driver import Recorder
     from rig.recorder.recorder_file import IN_VIRTUAL_TIME, SHIPPED_RECORDER_FILE, RecorderFile
 
@@ -58,7 +57,7 @@ def record_on_recorder(folder: Path, recorder: str, options: RecorderRecording) 
             "expected no --rate with a recorder file, got one; it states sensor.rate_hz."
         )
     # A simulated one is a new one for each run.
-    with _held(file, rig_locked), _wire(file, options) as wire:
+    with _held(file), _wire(file, options) as wire:
         device = Recorder(wire, file.law())
         if device.simulated != file.simulated:
             found, write = ("an emulated", "true") if device.simulated else ("a real", "false")
@@ -127,8 +126,9 @@ def _check_planted(texture: str) -> None:
 
 
 @contextmanager
-def _held(file: RecorderFile, rig_locked: Any) -> Iterator[None]:
+def _held(file: RecorderFile) -> Iterator[None]:
     """The recorder for this process alone; one in virtual time is its own."""
+    from rig.desk.lock import rig_locked
     from rig.recorder.recorder_file import IN_VIRTUAL_TIME
 
     if file.recorder.address == IN_VIRTUAL_TIME:
