@@ -32,8 +32,9 @@ def working(
     """The work on each item, `jobs` at a time, as they are done: number of the item, and result.
 
     Processes of their own where there are several items and jobs (as many jobs as cores without a
-    number). After an exception in the block no worker continues. With the address of a Dask
-    scheduler its workers do the same work instead.
+    number), in the folder that this process is in now: a relative path means there what it means
+    here. After an exception in the block no worker continues. With the address of a Dask scheduler
+    its workers do the same work instead, in folders of their own.
 
     Raises
     ------
@@ -50,8 +51,10 @@ def working(
         ending: dict[str, Any] = (
             {} if dask else {"initializer": _end_with, "initargs": (os.getpid(),)}
         )
+        # Joblib's processes are those of an earlier call, and may have begun in another folder.
+        folder = None if dask else os.getcwd()
         parallel = Parallel(n_jobs=most, return_as="generator_unordered", **ending)
-        results = parallel(delayed(_numbered)(work, *numbered) for numbered in enumerate(items))
+        results = parallel(delayed(_numbered)(work, folder, *of) for of in enumerate(items))
         try:
             yield results
         finally:
@@ -106,7 +109,11 @@ def _in_order(results: Iterator[tuple[int, Result]]) -> Iterator[Result]:
             wanted += 1
 
 
-def _numbered(work: Callable[[Item], Result], number: int, item: Item) -> tuple[int, Result]:
+def _numbered(
+    work: Callable[[Item], Result], folder: str | None, number: int, item: Item
+) -> tuple[int, Result]:
+    if folder is not None:
+        os.chdir(folder)
     return number, work(item)
 
 

@@ -89,6 +89,11 @@ def replace_folder(path: str | Path, seen: Contents | None = None) -> Iterator[P
         `contents_of` the folder when it was found to be one that may be replaced; without it, that
         is now.
 
+    Yields
+    ------
+    Path
+        The fresh folder, absolute: other processes and a change of folder mean the same place.
+
     Raises
     ------
     InputError
@@ -97,11 +102,12 @@ def replace_folder(path: str | Path, seen: Contents | None = None) -> Iterator[P
     OSError
         With the name that a file would have had at `path`, not with its hidden one.
     """
-    target = folder_behind(path)
+    named = folder_behind(path)
+    target = named.absolute()
     before = contents_of(target) if seen is None else seen
     with unfinished_folder(target) as hidden:
         fresh = hidden / target.name
-        with _named(target, fresh):
+        with _named(named, fresh):
             fresh.mkdir()
             yield fresh
             fresh.chmod(0o755)

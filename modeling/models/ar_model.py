@@ -20,6 +20,7 @@ from modeling.models.line_spectral import (
     prediction_coefficients,
     reflection_coefficients,
 )
+from modeling.models.parameter_table import flushed_to_zero
 
 
 class ARParameters(NamedTuple):
@@ -144,6 +145,11 @@ class ARModel(SavedModel):
         """Numbers per condition: p + 1."""
         return self.order + 1
 
+    @property
+    def rendered_gains(self) -> Floats:
+        """The gains (S, F), 0 where they are too small to be rendered."""
+        return flushed_to_zero(self.gains)
+
     def parameters(self, speed_mm_s: ArrayLike, force_n: ArrayLike) -> ARParameters:
         """Bilinear interpolation over the grid; edges: docs/method/rendering.md#grid-edges.
 
@@ -161,7 +167,7 @@ class ARModel(SavedModel):
         )
         cells = Cells(self.speeds_mm_s, self.forces_n, hand=hand)
         return ARParameters(
-            cells.blend(self.line_spectral_frequencies), cells.blend(self.gains) * ramp
+            cells.blend(self.line_spectral_frequencies), cells.blend(self.rendered_gains) * ramp
         )
 
     def filter(self, speed_mm_s: float, force_n: float) -> ARFilter:

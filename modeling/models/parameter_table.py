@@ -26,6 +26,10 @@ MOST_PARTS = 8
 # the grid, but told apart in single precision.
 NEXT = 1 + 1e-6
 LOWEST_GAIN_SHARE = 1e-6  # of a layer's largest gain, where one of 0 is to be blended
+# Gains below it are 0. A gain moves by no less than a thousandth of its largest value from sample to
+# sample, and single precision has to hold that in full; else it never fades (what is below a float
+# is rounded to 0).
+LEAST_GAIN = 1e3 * float(np.finfo(np.float32).tiny)
 
 
 class Parameters(NamedTuple):
@@ -37,6 +41,11 @@ class Parameters(NamedTuple):
     gains: Floats
 
 
+def flushed_to_zero(gains: Floats) -> Floats:
+    """Gains (g) of any shape, with 0 for those below `LEAST_GAIN`."""
+    return np.where(np.abs(gains) < LEAST_GAIN, 0.0, gains)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ParameterTable:
     """PEQ parameters of m layers over a grid of S speeds × F forces, as `kernel.h` reads them.
@@ -46,7 +55,8 @@ class ParameterTable:
     speeds_mm_s, forces_n : (S,), (F,) ndarray
         Rising, above 0, two or more each, as `kernel.h` wants them (see `wide_enough`).
     values : (S, F, 1 + 3m) ndarray
-        Noise gain, then all frequencies (Hz), all bandwidths (Hz), all signed gains.
+        Noise gain, then all frequencies (Hz), all bandwidths (Hz), all signed gains; gains below
+        `LEAST_GAIN` become 0.
     signs : (m,) ndarray
         1 or −1 where the layer's gain must not cross 0 (a grid of a regression's corners may), 0
         where it may.
@@ -67,6 +77,9 @@ class ParameterTable:
             raise InputError(
                 "expected finite parameters over the grid, got NaN or inf; make the model again."
             )
+        floor, shape, gains = np.split(self.values, [1, 1 + 2 * self.n_layers], axis=-1)
+        parts = [flushed_to_zero(floor), shape, flushed_to_zero(gains)]
+        object.__setattr__(self, "values", np.concatenate(parts, axis=-1))
 
     @property
     def n_layers(self) -> int:

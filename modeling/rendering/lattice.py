@@ -44,7 +44,7 @@ def lattice_fields(model: ARModel, plan: RenderPlan) -> LatticeFields:
             f"expected an AR model of order {MOST_ORDER} at most for real time, got order "
             f"{model.order} of {model.texture}; fit a lower one."
         )
-    values = np.concatenate([model.gains[..., None], model.line_spectral_frequencies], axis=-1)
+    values = np.concatenate([model.rendered_gains[..., None], model.line_spectral_frequencies], axis=-1)
     speeds, values = wide_enough(model.speeds_mm_s, values, along=0)
     forces, values = wide_enough(model.forces_n, values, along=1)
     texture = {
@@ -54,7 +54,7 @@ def lattice_fields(model: ARModel, plan: RenderPlan) -> LatticeFields:
         "force_n": forces,
         "values": values[..., 0].ravel(),
     }
-    texture |= plan.timing(np.array([model.gains.max()])) | plan.restraints()
+    texture |= plan.timing(np.array([model.rendered_gains.max()])) | plan.restraints()
     lattice = {
         "order": model.order,
         "frequencies": values[..., 1:].ravel(),

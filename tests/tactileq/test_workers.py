@@ -56,3 +56,25 @@ def test_several_maps_share_the_processes():
         first, second = mapped(abs, range(-6, 0)), mapped(str, range(3))
         assert list(second) == ["0", "1", "2"]
         assert list(first) == [6, 5, 4, 3, 2, 1]
+
+
+def test_a_relative_path_means_the_same_in_a_worker_that_began_elsewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def write(name: str) -> str:
+        Path(name).write_text(name)
+        return os.getcwd()
+
+    for folder in (tmp_path / "first", tmp_path / "second"):
+        folder.mkdir()
+        monkeypatch.chdir(folder)
+        with mapping(jobs=2) as mapped:
+            results = mapped(write, ["a", "b"])
+            monkeypatch.chdir(tmp_path)  # whatever the caller does meanwhile
+            assert set(results) == {str(folder)}
+    assert sorted(path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("?")) == [
+        "first/a",
+        "first/b",
+        "second/a",
+        "second/b",
+    ]

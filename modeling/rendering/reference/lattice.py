@@ -31,7 +31,7 @@ class LatticeFilter:
         self.axes = (model.speeds_mm_s, model.forces_n)
         self._state = [0.0] * model.order
         self._stages = [(0.0, 1.0)] * model.order
-        self._gain = GainRamps(plan.own, np.array([model.gains.max()]))
+        self._gain = GainRamps(plan.own, np.array([model.rendered_gains.max()]))
 
     def settings(self, amid: Hand, end: Hand) -> list[Any]:
         """Gain, RMS per gain, and sine and cosine of every stage from the highest order down."""

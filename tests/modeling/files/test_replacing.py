@@ -217,3 +217,17 @@ def test_a_dot_file_that_is_no_lock_of_ours_is_somebody_elses(target: Path) -> N
     seen = contents_of(target).keys()
     assert {".renv.lock", ".mine", "tactileq.lock"} < seen
     assert f".log{LOCK_NAME}" not in seen
+
+
+def test_a_caller_that_goes_elsewhere_meanwhile_moves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home, elsewhere = tmp_path / "home", tmp_path / "elsewhere"
+    home.mkdir()
+    elsewhere.mkdir()
+    monkeypatch.chdir(home)
+    with replace_folder("made") as fresh:
+        monkeypatch.chdir(elsewhere)
+        (fresh / "a").write_text("1")
+    assert (home / "made" / "a").read_text() == "1"
+    assert list(elsewhere.iterdir()) == []
