@@ -35,8 +35,9 @@ install: .venv/installed
 	@$(COMPILE) $(addprefix .venv/lib/python*/site-packages/,$(LOADED))
 	@touch $@
 
-# The project itself and its C parts; reports a missing compiler.
-.venv/installed: .venv/packages pyproject.toml setup.py tools/c_parts.py modeling/estimation/slopes.h modeling/rendering/kernel.h modeling/rendering/lattice.h modeling/rendering/many.h modeling/rendering/many_lanes.h modeling/rendering/call.c modeling/rendering/player.h modeling/rendering/weigh.h rig/live/live.h rig/live/sound.h benches/rendering/rivals.h benches/rendering/sounds.h
+# The project itself and its C parts; reports a missing compiler. Each header counts, whoever includes it.
+HEADERS := $(wildcard modeling/*/*.h rig/*/*.h benches/*/*.h)
+.venv/installed: .venv/packages pyproject.toml setup.py tools/c_parts.py modeling/rendering/call.c $(HEADERS)
 	@$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@$(BIN)/python -c "from modeling.rendering.compiled import is_compiled; is_compiled()"
 	@$(COMPILE) modeling stimuli rig experiments analysis benches tactileq
@@ -93,4 +94,5 @@ lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --extra test pyproject.toml -o requirements.lock
 
 clean:
-	rm -rf .venv .venv-core-* demo dist build *.egg-info modeling/rendering/_kernel* modeling/rendering/_call.* modeling/rendering/_many.* modeling/estimation/_slopes.* benches/rendering/_rivals.* rig/live/_live.* .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-core-* demo dist build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find modeling rig benches -name '_[a-z]*' \( -name '*.so' -o -name '*.pyd' -o -name '*.c' -o -name '*.o' \) -delete

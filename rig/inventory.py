@@ -23,7 +23,7 @@ from rig.force.dhd import UNTESTED, DhdLibrary
 from rig.force.wall import largest_stiffness_n_per_mm
 from rig.hand.devices import connected_devices
 from rig.hand.sample import ConnectedDevice
-from rig.live.memory import compiled
+from rig.live.compiled import compiled
 from rig.setup.force_sections import DeviceSection, ForceSection
 from rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
 from rig.sound.devices import (

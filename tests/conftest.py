@@ -1,4 +1,4 @@
-"""Shared by all tests: no skipping on demand, an audio server, files of a toolkit's layout."""
+"""Shared by all tests: which of them run, an audio server, files of a toolkit's layout."""
 
 from __future__ import annotations
 
@@ -25,13 +25,15 @@ from hypothesis import settings
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
+from rig.live.clock import GivenClock
 from tests.audio_lock import LockWatch
-from tests.extras import is_to_collect, not_collected, skip_what_lacks_packages
-from tests.real_time import BareProcess, needs_time, repeat_where_the_machine_stood_still
+from tests.extras import ROOT, is_to_collect, not_collected, skip_what_lacks_packages
+from tests.selection import holds_tests, is_chosen, uses_audio_server
 
-# A slow machine is no counterexample: hypothesis must not fail a test for its wall time.
-settings.register_profile("house", deadline=None)
-settings.load_profile("house")
+# `make test` tries the same examples everywhere; `make test-long` others each time. A slow machine
+# is no counterexample: no test fails for its wall time.
+settings.register_profile("fixed", deadline=None, database=None, derandomize=True)
+settings.register_profile("random", deadline=None, database=None, print_blob=True)
 
 # The libraries, loaded once, are a million objects. By default they are looked through for garbage
 # again and again, which takes more than a twentieth of the time of all tests.
@@ -39,18 +41,14 @@ gc.set_threshold(20_000, 10, 10)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--long", action="store_true", help="long tests, and other random examples")
     parser.addoption(
-        "--no-skips", action="store_true", help="end red where a test was skipped (used by CI)"
+        "--no-skips", action="store_true", help="end red where a test was left out (used by CI)"
     )
 
 
-def pytest_terminal_summary(
-    terminalreporter: pytest.TerminalReporter, config: pytest.Config
-) -> None:
-    if config.getoption("--no-skips") and terminalreporter.stats.get("skipped"):
-        terminalreporter.write_line("error: expected every test to run, got skipped ones.")
-    for kept in _LOCK.freed:
-        terminalreporter.write_line(f"note: JACK's lock was kept for seconds, and freed: {kept}")
+def pytest_configure(config: pytest.Config) -> None:
+    settings.load_profile("random" if config.getoption("--long") else "fixed")
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
@@ -58,19 +56,13 @@ def pytest_sessionstart(session: pytest.Session) -> None:
         _LOCK.begin()
 
 
-@pytest.hookimpl(trylast=True)
-def pytest_sessionfinish(session: pytest.Session) -> None:
-    reporter = session.config.pluginmanager.get_plugin("terminalreporter")  # of the whole run
-    if reporter and session.config.getoption("--no-skips") and reporter.stats.get("skipped"):
-        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+def pytest_unconfigure() -> None:
+    _LOCK.close()
 
 
-_BARE = BareProcess()
 _LOCK = LockWatch()
 
-
-def pytest_report_header() -> str:
-    return not_collected()
+# --- What is run ----------------------------------------------------------------------------------
 
 
 def pytest_ignore_collect(collection_path: Path) -> bool | None:
@@ -79,33 +71,64 @@ def pytest_ignore_collect(collection_path: Path) -> bool | None:
     return None  # others may have a reason
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     skip_what_lacks_packages(items)
-    # First, so that one worker has them and the other does not wait for its turn.
-    items.sort(key=needs_time, reverse=True)
-    repeat_where_the_machine_stood_still(items, _BARE)
+    _FILES.update(str(item.path) for item in items)
+    chosen = [item for item in items if is_chosen(item, long=config.getoption("--long"))]
+    left = [item for item in items if item not in set(chosen)]
+    if left:
+        config.hook.pytest_deselected(items=left)
+    # Those with an audio server first: they wait for each other, so one worker has them all.
+    items[:] = sorted(chosen, key=uses_audio_server, reverse=True)
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[object]:
-    if not needs_time(item):
+    if not uses_audio_server(item):
         return (yield)
     # However many workers and runs there are on this machine: a JACK server that begins or ends
     # cuts the clients of another one off for a moment (github.com/jackaudio/jack2/issues/280).
-    with FileLock(Path(tempfile.gettempdir()) / f"tactileq-real-time-{os.getuid()}.lock"):
+    with FileLock(Path(tempfile.gettempdir()) / f"tactileq-audio-{os.getuid()}.lock"):
         return (yield)
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_setup(item: pytest.Item) -> Iterator[None]:
-    if needs_time(item):
-        _BARE.begin()
-    return (yield)
+# --- What was left out ----------------------------------------------------------------------------
+
+_FILES: set[str] = set()  # of tests that were collected, by all workers
 
 
-def pytest_unconfigure() -> None:
-    _BARE.close()
-    _LOCK.close()
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    if (output := getattr(session.config, "workeroutput", None)) is not None:
+        output["files"] = sorted(_FILES)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:
+    _FILES.update(getattr(node, "workeroutput", {}).get("files", ()))
+
+
+def pytest_report_header() -> str:
+    return not_collected()
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
+    for kept in _LOCK.freed:
+        terminalreporter.write_line(f"note: JACK's lock was kept for seconds, and freed: {kept}")
+    if not config.getoption("--no-skips"):
+        return
+    found = [not_collected()] if not_collected() else []
+    if terminalreporter.stats.get("skipped"):
+        found.append(f"{len(terminalreporter.stats['skipped'])} tests were skipped")
+    if config.args == config.getini("testpaths"):
+        there = {str(path) for path in (ROOT / "tests").rglob("*.py") if holds_tests(path)}
+        found += [f"{path} was not collected" for path in sorted(there - _FILES)]
+    for sentence in found:
+        terminalreporter.write_line(f"error: expected every test to run, got: {sentence}.")
+    if found and terminalreporter._session is not None:
+        terminalreporter._session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
 @pytest.fixture(scope="session")
@@ -146,6 +169,14 @@ def _file_size_limit(bytes_: int) -> Iterator[None]:
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
         signal.signal(signal.SIGXFSZ, handler)
+
+
+@pytest.fixture
+def given_clock() -> Iterator[None]:
+    """A clock that stands still while any process of a rig is late (docs/method/live.md#clock)."""
+    with GivenClock() as clock:
+        yield
+        assert clock.hung == 0, "expected all who take part in the clock to go on"
 
 
 @pytest.fixture

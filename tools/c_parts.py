@@ -26,6 +26,7 @@ RIVALS = ROOT / "benches" / "rendering" / "rivals.h"
 SOUNDS = ROOT / "benches" / "rendering" / "sounds.h"
 PLAYER = ROOT / "modeling" / "rendering" / "player.h"
 WEIGH = ROOT / "modeling" / "rendering" / "weigh.h"
+CLOCK = ROOT / "rig" / "live" / "clock.h"
 LIVE = ROOT / "rig" / "live" / "live.h"
 SOUND = ROOT / "rig" / "live" / "sound.h"
 BACKEND = ROOT / "rig" / "force" / "backend.h"
@@ -49,7 +50,7 @@ def declarations(header: Path) -> str:
     structures = re.findall(r"^typedef struct \{.*?^\} \w+;$", text, re.DOTALL | re.MULTILINE)
     call = r"^static (?:inline )?([^;{}=]*?\([^)]*\))(?=\s*\{)"
     calls = re.findall(call, text, re.MULTILINE)
-    return "\n".join([*structures, *(f"{call};" for call in calls)])
+    return "\n".join([*structures, *(f"{call};" for call in dict.fromkeys(calls))])
 
 
 def binding(
@@ -116,6 +117,7 @@ def live_binding() -> FFI:
                 declarations(KERNEL),
                 declarations(LATTICE),
                 voice[0],
+                declarations(CLOCK),
                 declarations(LIVE),
                 declarations(SOUND),
                 declarations(BACKEND),
@@ -126,12 +128,26 @@ def live_binding() -> FFI:
             )
         )
     )
-    headers = (KERNEL, LATTICE, PLAYER, WEIGH, LIVE, SOUND, BACKEND, DHD, FORCE, STROKE, SERVO)
+    headers = (
+        KERNEL,
+        LATTICE,
+        PLAYER,
+        WEIGH,
+        CLOCK,
+        LIVE,
+        SOUND,
+        BACKEND,
+        DHD,
+        FORCE,
+        STROKE,
+        SERVO,
+    )
     builder.set_source(
         "rig.live._live",
         f'#include "{SOUND.name}"\n#include "{SERVO.name}"',
         include_dirs=[str(PLAYER.parent), str(SOUND.parent), str(SERVO.parent)],
         depends=[str(header) for header in headers],
+        define_macros=[("_GNU_SOURCE", None)],
         extra_compile_args=COMPILER_ARGUMENTS,
         optional=True,  # no compiler: everything but a live rig works
     )
@@ -149,7 +165,8 @@ def standin_binding() -> FFI:
         "rig.force._standin",
         f'#include "{STANDIN.name}"',
         include_dirs=[str(STANDIN.parent), str(LIVE.parent)],
-        depends=[str(STANDIN), str(LIVE)],
+        depends=[str(STANDIN), str(LIVE), str(CLOCK)],
+        define_macros=[("_GNU_SOURCE", None)],
         extra_compile_args=COMPILER_ARGUMENTS,
         optional=True,
     )
@@ -168,14 +185,14 @@ def virtual_board() -> str:
 def device_binding() -> FFI:
     """The builder of `rig.device._device`: the firmware on a simulated board."""
     header = DEVICE / "virtual.h"
-    inner = ("backend.h", "force.h", "kernel.h", "scene.h", "weigh.h")
+    inner = ("backend.h", "clock.h", "force.h", "kernel.h", "scene.h", "weigh.h")
     others = ("cables.h", "device.h", "mechanics.h", "model.h", "observer.h", "registers.h")
     others += ("served.h", "simulated.h", "tension.h", "wire.h")
     builder = FFI()
     numbers = "typedef double tq_number;\n#define TQ_MOTORS 2"
     mechanics = (declarations(DEVICE / f"{name}.h") for name in ("cables", "mechanics"))
     builder.cdef("\n".join((numbers, *mechanics, virtual_board())))
-    folders = [DEVICE, FORCE.parent, KERNEL.parent]
+    folders = [DEVICE, FORCE.parent, KERNEL.parent, LIVE.parent]
     builder.set_source(
         "rig.device._device",
         f'#include "{header.name}"',
@@ -214,8 +231,8 @@ def recorder_binding() -> FFI:
     builder.set_source(
         "rig.recorder._recorder",
         '#include "board.h"',
-        include_dirs=[str(RECORDER), str(DEVICE), str(FORCE.parent)],
-        depends=[str(header) for header in (*headers, *others, BACKEND)],
+        include_dirs=[str(RECORDER), str(DEVICE), str(FORCE.parent), str(LIVE.parent)],
+        depends=[str(header) for header in (*headers, *others, BACKEND, CLOCK)],
         define_macros=[("_GNU_SOURCE", None)],
         extra_compile_args=COMPILER_ARGUMENTS,
         optional=True,

@@ -35,7 +35,7 @@ import pandas as pd
 from modeling.seeds import generator
 from rig.desk.desk_rig import DeskRig
 from rig.hand.serial_line import SensorLine, encode
-from rig.live.memory import now_s
+from rig.live.clock import now_s
 from rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
 from stimuli.planted.textures import planted_texture
 

@@ -18,7 +18,8 @@ import numpy as np
 import sounddevice
 
 from modeling.rendering.limits import Limits
-from rig.live.memory import Live, now_s
+from rig.live.clock import now_s
+from rig.live.memory import Live
 from rig.sound.output import SoundOutput
 from stimuli.planted.textures import planted_texture
 

@@ -28,7 +28,8 @@ import pandas as pd
 
 from modeling import Renderer
 from modeling.rendering.limits import Limits
-from rig.live.memory import UNDERFLOW, Live, now_s
+from rig.live.clock import now_s
+from rig.live.memory import UNDERFLOW, Live
 from rig.sound.output import SoundOutput
 from stimuli.planted.textures import planted_texture
 

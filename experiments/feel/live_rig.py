@@ -14,7 +14,8 @@ from modeling.rendering.plan import RenderCounters
 from rig.force.hand import ForceHand
 from rig.force.wall import Wall
 from rig.hand.reader import HandReader
-from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, OLDEST_READING_S, Live, now_s
+from rig.live.clock import now_s
+from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, OLDEST_READING_S, Live
 from rig.sound.supervision import SoundLost
 from rig.sound.vibration import VibrationOutput
 

@@ -26,9 +26,8 @@ MOST_PARTS = 8
 # the grid, but told apart in single precision.
 NEXT = 1 + 1e-6
 LOWEST_GAIN_SHARE = 1e-6  # of a layer's largest gain, where one of 0 is to be blended
-# Gains below it are 0. A gain moves by no less than a thousandth of its largest value from sample to
-# sample, and single precision has to hold that in full; else it never fades (what is below a float
-# is rounded to 0).
+# Gains below it are 0. From sample to sample a gain moves by a thousandth of its largest value or
+# more, which single precision has to hold in full: a step that is rounded to 0 never ends a fade.
 LEAST_GAIN = 1e3 * float(np.finfo(np.float32).tiny)
 
 

@@ -44,7 +44,9 @@ def lattice_fields(model: ARModel, plan: RenderPlan) -> LatticeFields:
             f"expected an AR model of order {MOST_ORDER} at most for real time, got order "
             f"{model.order} of {model.texture}; fit a lower one."
         )
-    values = np.concatenate([model.rendered_gains[..., None], model.line_spectral_frequencies], axis=-1)
+    values = np.concatenate(
+        [model.rendered_gains[..., None], model.line_spectral_frequencies], axis=-1
+    )
     speeds, values = wide_enough(model.speeds_mm_s, values, along=0)
     forces, values = wide_enough(model.forces_n, values, along=1)
     texture = {

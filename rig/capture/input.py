@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from modeling.arrays import Floats
 from modeling.checks import check_rate, check_whole, is_positive
 from modeling.errors import InputError, shortened, shown
-from rig.live.memory import now_s
+from rig.live.clock import now_s
 from rig.sound.devices import check_rate as check_device_rate
 from rig.sound.devices import find_device, portaudio
 
@@ -79,7 +79,7 @@ class InputBlock:
     samples : (n,) ndarray
         Shares of full scale.
     time_s : float
-        When the first sample was measured, by `rig.live.memory.now_s`; the input latency is
+        When the first sample was measured, by `rig.live.clock.now_s`; the input latency is
         taken off.
     lost : bool
         Whether samples are missing between the block before and this one.

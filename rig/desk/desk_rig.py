@@ -5,7 +5,6 @@ docs/rig-file.md
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
@@ -41,7 +40,8 @@ from rig.interface import (
     ToneBurst,
     grid_of,
 )
-from rig.live.memory import GONE, OLDEST_READING_S, Live, now_s
+from rig.live.clock import now_s, sleep
+from rig.live.memory import GONE, OLDEST_READING_S, Live
 from rig.setup.rig_file import RigFile
 from rig.sound.signals import tone_burst
 from rig.sound.supervision import SoundLost
@@ -265,7 +265,7 @@ class DeskRig:
             return self._present_stimulus(signal)
         while (left_s := self._signal_end_s - now_s()) > 0:
             self._notice()
-            time.sleep(min(left_s, LOOK_S))
+            sleep(min(left_s, LOOK_S))
         self.silence()
         sound, samples = self.parts.sound, self._samples(signal)
         start_s = self._started(lambda: sound.play_signal(samples))
@@ -495,4 +495,4 @@ def _wait_for_reading(live: Live) -> None:
                 f"expected a reading of the hand within {FIRST_READING_S:g} s, got none; check its "
                 "device (tactileq rig check)."
             )
-        time.sleep(0.005)
+        sleep(0.005)

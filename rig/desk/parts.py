@@ -13,6 +13,7 @@ from rig.force.hand import ForceHand
 from rig.force.settings import ForceSettings, Pose, Vibration
 from rig.hand.reader import HandReader
 from rig.hand.settings import HandSettings
+from rig.live.clock import check_clock
 from rig.live.memory import Live
 from rig.setup.rig_file import RigFile
 from rig.setup.sections import AccelerometerSection
@@ -71,6 +72,7 @@ def _compensation(rig: RigFile) -> Compensation | None:
 def sound_output(rig: RigFile, live: Live, *, seed: int = 0) -> SoundOutput:
     """The sound card, not opened yet; of a device that renders it plays the masking noise only."""
     sound, masking, plays = rig.sound, rig.sound.masking_channel, rig.renderer is None
+    check_clock("a sound card", simulated=sound.simulated)
     return SoundOutput(
         live,
         device=sound.device,

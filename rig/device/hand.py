@@ -13,7 +13,8 @@ from rig.force.settings import ForceSettings
 from rig.hand.messages import Report
 from rig.hand.settings import HandSettings
 from rig.live.child import ChildLost
-from rig.live.memory import Live, now_s
+from rig.live.clock import now_s
+from rig.live.memory import Live
 
 ANSWER_S = 20.0  # an upload through a slow port
 _LOOK_S = 0.02

@@ -22,7 +22,8 @@ from rig.device.messages import (
 )
 from rig.device.registers import DeviceSource
 from rig.force.settings import Vibration
-from rig.live.memory import BLOCK, HEARTBEAT_S, NO_HEARTBEAT, STALE, UNDERFLOW, Live, now_s
+from rig.live.clock import now_s
+from rig.live.memory import BLOCK, HEARTBEAT_S, NO_HEARTBEAT, STALE, UNDERFLOW, Live
 from rig.setup.rig_file import DEVICE_RATE_HZ
 from rig.wire.conversation import DeviceRefused
 from rig.wire.link import Link

@@ -8,7 +8,6 @@ as readings of the hand. The law runs in the device (docs/device.md#in-a-rig).
 from __future__ import annotations
 
 import threading
-import time
 from contextlib import suppress
 
 from modeling.errors import InputError
@@ -22,8 +21,9 @@ from rig.force.settings import ForceSettings
 from rig.force.states import Ask, Cause, State
 from rig.force.words import ServoWords
 from rig.hand.messages import Firmware, Ready
+from rig.live.clock import now_s, sleep, taking_part
 from rig.live.driven import Parent
-from rig.live.memory import BEYOND, BUTTON, CONTACT, FORCE_COMMANDED, SIMULATED, Live, now_s
+from rig.live.memory import BEYOND, BUTTON, CONTACT, FORCE_COMMANDED, SIMULATED, Live
 from rig.setup.rig_file import DEVICE_RATE_HZ
 from rig.wire.conversation import Block, DeviceRefused
 from rig.wire.link import Link
@@ -80,7 +80,7 @@ class DeviceServo(ServedServo):
 
     def _run_once(self) -> None:
         self._real_time = real_time(SERVO_PRIORITY)  # the thread of the link inherits it
-        with self._link:
+        with self._link, taking_part():
             self._ready = False
             while not self._gone.is_set():
                 self._turn()
@@ -107,7 +107,7 @@ class DeviceServo(ServedServo):
                 if self._link.connected:
                     raise
         self._pass_on(self._link.blocks())
-        time.sleep(max(0.0, TURN_S - (now_s() - began_s)))
+        sleep(max(0.0, TURN_S - (now_s() - began_s)))
 
     def _prepare(self) -> None:
         """Set the limits of a device that is here anew; the narrower workspace counts."""
@@ -120,7 +120,7 @@ class DeviceServo(ServedServo):
             )
         if link.read("State") not in (State.BOOT, State.IDLE, State.FAULT):
             link.write("Command", DeviceCommand.STOP)
-            time.sleep(0.05)
+            sleep(0.05)
         low_x, high_x, low_z, high_z = link.read("Workspace")  # type: ignore[misc]
         (x0, _, z0), (x1, _, z1) = settings.low_mm, settings.high_mm
         link.write("Workspace", (max(x0, low_x), min(x1, high_x), max(z0, low_z), min(z1, high_z)))
@@ -241,7 +241,7 @@ class DeviceServo(ServedServo):
                 self._link.write("Command", DeviceCommand.STOP)
                 end_s = now_s() + 0.2
                 while now_s() < end_s and self._number("State") == State.RELEASING:
-                    time.sleep(TURN_S)
+                    sleep(TURN_S)
             self._link.write("EventRate", 0)
 
     def _write_gone(self) -> None:

@@ -5,7 +5,6 @@ docs/device.md#texture
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
@@ -28,7 +27,8 @@ from rig.device.messages import (
 )
 from rig.device.models import ANY_DEVICE, device_model
 from rig.live.child import ChildLost
-from rig.live.memory import Live, Rows, now_s
+from rig.live.clock import now_s, sleep
+from rig.live.memory import Live, Rows
 from rig.setup.rig_file import DEVICE_BLOCK_S, DEVICE_RATE_HZ
 from rig.sound.output import SoundOutput, check_masking
 from rig.sound.played import STALLED_S
@@ -193,7 +193,7 @@ class DeviceSound(VibrationOutput):
             fitting = rows[np.asarray(found(rows), dtype=bool)]
             if fitting.size:
                 return fitting[0]  # type: ignore[no-any-return]
-            time.sleep(_POLL_S)
+            sleep(_POLL_S)
         raise ChildLost("its device plays nothing")
 
     def _wait_for_end(self, number: int, within_s: float) -> None:

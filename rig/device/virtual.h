@@ -10,9 +10,10 @@
 #include <stdlib.h>
 
 #ifndef _WIN32
+#include "clock.h"
+
 #include <errno.h>
 #include <poll.h>
-#include <time.h>
 #include <unistd.h>
 #endif
 
@@ -113,22 +114,6 @@ static int tq_virtual_run(tq_virtual *v, int port, int end, int other)
     return -1;
 }
 #else
-static inline double tq_virtual_now(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
-static inline int tq_virtual_wait(struct pollfd on[3], const struct timespec *wait)
-{
-#ifdef __linux__
-    return ppoll(on, 3, wait, NULL);
-#else
-    return poll(on, 3, wait->tv_nsec > 0);
-#endif
-}
-
 /* Writes what is to be sent, as much as the port takes; not 0 where the port is gone. */
 static inline int tq_virtual_flush(tq_virtual *v, int port)
 {
@@ -147,16 +132,16 @@ static inline int tq_virtual_flush(tq_virtual *v, int port)
    was held up for over 20 ms, its does. */
 static int tq_virtual_run(tq_virtual *v, int port, int end, int other)
 {
-    double due_s = tq_virtual_now(), now_s;
+    double due_s = tq_now(), now_s;
     struct pollfd on[3];
     uint8_t bytes[512];
     memset(on, 0, sizeof on);
     on[0].fd = port, on[1].fd = end, on[2].fd = other;
     on[1].events = on[2].events = POLLIN;
+    tq_take_part(1);
     for (;;) {
-        struct timespec wait = { 0, 0 };
         ssize_t count = 0;
-        now_s = tq_virtual_now();
+        now_s = tq_now();
         if (now_s - due_s > 0.02) {
             v->device.values.ticks_late += (uint32_t)((now_s - due_s) * TQ_TICK_HZ);
             due_s = now_s;
@@ -166,10 +151,8 @@ static int tq_virtual_run(tq_virtual *v, int port, int end, int other)
         if (port >= 0 && tq_virtual_flush(v, port))
             return -1;
         /* Longer where nothing is to be done: the ticks are made up for at once. */
-        wait.tv_nsec = (long)(1e9 * (due_s - now_s + (tq_device_pace(&v->device) - 1.0) / TQ_TICK_HZ));
-        wait.tv_nsec = wait.tv_nsec < 0 ? 0 : wait.tv_nsec;
         on[0].events = (short)(POLLIN | (v->waiting ? POLLOUT : 0));
-        if (tq_virtual_wait(on, &wait) < 0 && errno != EINTR)
+        if (tq_poll_until(on, 3, due_s + (tq_device_pace(&v->device) - 1.0) / TQ_TICK_HZ) < 0 && errno != EINTR)
             return -1;
         if (on[1].revents || on[2].revents)
             return on[1].revents ? 0 : 1;

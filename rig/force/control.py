@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 from rig.force.states import Ask, Status
 from rig.force.wall import Wall
-from rig.live.memory import Live, compiled, now_s
+from rig.live.clock import now_s, sleep
+from rig.live.compiled import compiled
+from rig.live.memory import Live
 
 ANSWER_S = 0.1
 _LOOK_S = 0.0005
@@ -59,7 +60,7 @@ class Control:
         self._lib.tq_put_word(self._live.address, word, asked)
         until_s = now_s() + within_s
         while (status := self.status).asked != asked and now_s() < until_s:
-            time.sleep(_LOOK_S)
+            sleep(_LOOK_S)
         return status
 
     def set_wall(self, wall: Wall) -> None:

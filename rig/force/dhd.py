@@ -17,7 +17,7 @@ from cffi import FFI
 
 from modeling.errors import InputError, shown
 from rig.force.settings import ForceSettings
-from rig.live.memory import compiled
+from rig.live.compiled import compiled
 from rig.setup.force_sections import STAND_IN
 
 UNTESTED = "untested on hardware"

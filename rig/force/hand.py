@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from contextlib import suppress
 
 from modeling.errors import InputError
@@ -16,7 +15,8 @@ from rig.hand.messages import Ready
 from rig.hand.reader import SILENT_S, START_S, HandReader
 from rig.hand.settings import HandSettings
 from rig.live.child import Child, ChildLost
-from rig.live.memory import Live, now_s
+from rig.live.clock import check_clock, now_s, sleep
+from rig.live.memory import Live
 from rig.live.messages import Done
 
 START_ANEW_S = 2.0  # for a process that takes the place of another one
@@ -42,6 +42,7 @@ class ForceHand(HandReader):
 
     def __init__(self, live: Live, settings: HandSettings, force: ForceSettings) -> None:
         force.check_late()
+        check_clock("a force device", simulated=force.simulated)
         super().__init__(live, settings)
         self._force = force
         self._control = Control(live)
@@ -97,7 +98,7 @@ class ForceHand(HandReader):
             self._control.ask(Ask.CLEAR)
         until_s = now_s() + START_ANEW_S
         while self._begins and now_s() < until_s:
-            time.sleep(_LOOK_S)
+            sleep(_LOOK_S)
         if self.status.state == State.IDLE:
             self._control.ask(Ask.ARM)
         status = self.status

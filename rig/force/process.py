@@ -24,8 +24,10 @@ from rig.force.settings import (
     ForceSettings,
 )
 from rig.hand.messages import Ready
+from rig.live.clock import now_s
+from rig.live.compiled import compiled
 from rig.live.driven import Parent
-from rig.live.memory import GONE, HEARTBEAT_S, SIMULATED, Live, compiled, now_s
+from rig.live.memory import GONE, HEARTBEAT_S, SIMULATED, Live
 
 
 def main() -> None:

@@ -14,8 +14,9 @@ from rig.force.realtime import outlive_signals
 from rig.force.settings import ForceSettings
 from rig.force.states import Ask
 from rig.hand.messages import HandFault
+from rig.live.clock import now_s, wait_for
 from rig.live.driven import Parent
-from rig.live.memory import Live, now_s
+from rig.live.memory import Live
 from rig.live.messages import Done, Message
 
 AGAIN_S = 0.5  # between attempts to open a device that is gone
@@ -79,7 +80,7 @@ class ServedServo(ABC):
     def _wait(self) -> None:
         """Until the next attempt; the readings go on, and say that there is no device."""
         until_s = now_s() + AGAIN_S
-        while now_s() < until_s and not self._gone.wait(_BEAT_S):
+        while now_s() < until_s and not wait_for(self._gone.wait, _BEAT_S):
             self._write_gone()
 
 

@@ -14,15 +14,6 @@
 #include "live.h"
 #include "stroke.h"
 
-#ifdef _WIN32
-#define tq_pause() Sleep(0)
-#elif defined __linux__
-#include <errno.h>
-#else
-#include <sched.h>
-#define tq_pause() sched_yield()
-#endif
-
 #define TQ_LOST_S 0.5      /* a device that has failed for so long is opened again */
 #define TQ_READING_S 0.001 /* between two readings in shared memory */
 
@@ -187,31 +178,18 @@ static inline int tq_servo_tick(tq_servo *s)
     return !((s->stopping || s->failing_s > TQ_LOST_S) && s->force.normal_n == 0);
 }
 
-/* Returns at the moment, or soon after. */
-static inline void tq_sleep_until(double time_s)
-{
-#if defined __linux__
-    struct timespec until;
-    until.tv_sec = (time_t)time_s;
-    until.tv_nsec = (long)(1e9 * (time_s - (double)until.tv_sec));
-    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL) == EINTR) {
-    }
-#else
-    while (tq_now() < time_s)
-        tq_pause();
-#endif
-}
-
 /* The loop, until it is asked to stop or the device is gone, and the force is 0. */
 static void tq_servo_run(tq_servo *s)
 {
     double due_s = tq_now();
+    tq_take_part(1);
     while (tq_servo_tick(s)) {
         due_s += s->settings.period_s;
         if (due_s < tq_now() - s->settings.period_s) /* held up: do not catch up in a burst */
             due_s = tq_now();
         tq_sleep_until(due_s);
     }
+    tq_take_part(0);
 }
 
 /* --- The watchdog's process ---------------------------------------------------------------------- */

@@ -225,9 +225,10 @@ int dhdGetPosition(double *x, double *y, double *z, char id)
     (void)id;
     out[0] = x, out[1] = y, out[2] = z;
     if (d->stall_s > 0) {
-        useconds_t stall = (useconds_t)(1e6 * d->stall_s);
+        double until_s = tq_now() + d->stall_s;
         d->stall_s = 0;
-        usleep(stall);
+        tq_know_place();
+        tq_sleep_until(until_s);
     }
     tq_standin_move(d, tq_now());
     d->reads++;

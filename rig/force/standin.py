@@ -8,11 +8,11 @@ from __future__ import annotations
 import mmap
 import os
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
 from modeling.errors import InputError
+from rig.live.clock import sleep
 
 try:
     import rig.force._standin as _standin
@@ -72,7 +72,7 @@ class StandIn:
         one = self.fields
         one.stroke, one.hand_stiffness, one.hand_damping = 0.0, 60.0, 5.0
         one.press = -(one.real_height - 0.0005 if on_real else one.real_height + 0.02)
-        time.sleep(CARRIED_S)
+        sleep(CARRIED_S)
         one.hand_stiffness = one.hand_damping = 0.0
         one.velocity = [0.0, 0.0, 0.0]
 

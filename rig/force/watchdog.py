@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import signal
 import threading
-import time
 from contextlib import suppress
 
 from modeling.errors import InputError
@@ -21,8 +20,9 @@ from rig.force.realtime import WATCHDOG_PRIORITY, outlive_signals, real_time
 from rig.force.settings import MISSED_S, ForceSettings
 from rig.force.states import State
 from rig.hand.messages import Ready
+from rig.live.clock import now_s, sleep, taking_part
 from rig.live.driven import Parent
-from rig.live.memory import Live, now_s
+from rig.live.memory import Live
 from rig.live.messages import Done
 
 LOOK_S = 0.05
@@ -43,7 +43,8 @@ def main() -> None:
             threading.Thread(target=dog.listen, daemon=True).start()
             real_time(WATCHDOG_PRIORITY)
             parent.send(Ready("watchdog"))
-            dog.run()
+            with taking_part():
+                dog.run()
 
 
 class _Watchdog:
@@ -94,7 +95,7 @@ class _Watchdog:
                 sentence = str(error)
             if now_s() > until_s:
                 break
-            time.sleep(EVERY_S)
+            sleep(EVERY_S)
         self._servo = 0
         self._control.stood_still()
         with suppress(OSError):

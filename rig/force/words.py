@@ -6,7 +6,9 @@ from math import nan
 from typing import Any
 
 from rig.force.states import Ask, Cause, State
-from rig.live.memory import FORCE_COMMANDED, GONE, SIMULATED, Live, compiled, now_s
+from rig.live.clock import now_s
+from rig.live.compiled import compiled
+from rig.live.memory import FORCE_COMMANDED, GONE, SIMULATED, Live
 
 
 class ServoWords:

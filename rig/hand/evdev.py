@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import errno
 import os
-import select
 import struct
 import time
 from fcntl import ioctl
@@ -41,7 +40,7 @@ from rig.hand.pressure import PressureCurve
 from rig.hand.sample import ConnectedDevice, DeviceLost, Sample
 from rig.hand.settings import HandSettings
 from rig.hand.tracking import REST_S
-from rig.live.memory import now_s
+from rig.live.clock import now_s, readable
 
 SYSFS = Path("/sys/class/input")
 DEV = Path("/dev/input")
@@ -152,7 +151,7 @@ class EventDevice:
 
     def wait(self, seconds: float) -> None:
         """Until events come."""
-        select.select([self._handle], [], [], seconds)
+        readable(self._handle, seconds)
 
     def read(self) -> list[Sample]:
         """The samples of all frames that have come; DeviceLost where the device is gone.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import queue
 import threading
-import time
 from collections.abc import Callable
 from contextlib import suppress
 
@@ -14,7 +13,8 @@ from rig.hand.messages import Counts, Firmware, HandFault
 from rig.hand.sample import LOST_S, Device, DeviceLost
 from rig.hand.settings import HandSettings
 from rig.hand.tracking import REST_S
-from rig.live.memory import Live, now_s
+from rig.live.clock import now_s, sleep
+from rig.live.memory import Live
 
 BEAT_S = 0.002  # readings are written so often at most, and at rest
 AGAIN_S = 0.5  # between attempts to open a device that is gone
@@ -76,7 +76,7 @@ class HandLoop:
     def step(self) -> None:
         """Wait for samples or the next beat, and write what there is."""
         if self._device is None:
-            time.sleep(BEAT_S)
+            sleep(BEAT_S)
             self._open_again()
             now = now_s()
         else:

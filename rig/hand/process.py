@@ -13,6 +13,7 @@ from contextlib import suppress
 from modeling.errors import InputError
 from rig.hand.loop import HandLoop
 from rig.hand.messages import HandFault, ReadHand, Ready, Unplug
+from rig.live.clock import taking_part
 from rig.live.driven import Parent
 from rig.live.memory import Live
 from rig.live.messages import Done
@@ -30,8 +31,9 @@ def main() -> None:
             gc.collect()
             gc.freeze()  # what was made so far is not looked through in the middle of a stroke
             try:
-                while not parent_gone.is_set():
-                    loop.step()
+                with taking_part():
+                    while not parent_gone.is_set():
+                        loop.step()
             finally:
                 loop.close()
 

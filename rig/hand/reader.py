@@ -14,7 +14,8 @@ from rig.hand.settings import HandSettings
 from rig.hand.tracking import REST_S
 from rig.hand.window import WindowHand
 from rig.live.child import Child, ChildLost
-from rig.live.memory import Live, now_s
+from rig.live.clock import now_s, wait_for
+from rig.live.memory import Live
 from rig.live.messages import Done
 
 START_S = 30.0
@@ -118,7 +119,7 @@ class HandReader:
         A serial sensor is given a second to do so after it was opened.
         """
         if self._settings.kind == "serial":
-            self._has_firmware.wait(max(0.0, self._ready_s + FIRMWARE_S - now_s()))
+            wait_for(self._has_firmware.wait, max(0.0, self._ready_s + FIRMWARE_S - now_s()))
         return self._firmware
 
     def push(self, x: float, y: float, *, down: bool = True, button: bool = False) -> None:
@@ -174,7 +175,7 @@ class HandReader:
             # The process is no more and its heir not yet there: nobody else writes.
             Follower(self._settings, rest_s=REST_S).gone(now_s()).write(self._live)
             self._add_fault(f"the process that reads the hand ended {how} and is started again.")
-            if self._closing.wait(_PAUSE_S):
+            if wait_for(self._closing.wait, _PAUSE_S):
                 return
             child = self._start(patient=True)
 
@@ -205,7 +206,7 @@ class HandReader:
     def _watch(self) -> None:
         """Kill a process that writes no readings; `_keep` replaces it."""
         looked_s, held_up_s = now_s(), float("-inf")
-        while not self._closing.wait(_WATCH_S):
+        while not wait_for(self._closing.wait, _WATCH_S):
             if now_s() - looked_s > SILENT_S / 2:  # the computer was held up, and the process too
                 held_up_s = now_s()
             looked_s = now_s()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from math import cos, pi
 from pathlib import Path
 from typing import Protocol
@@ -16,7 +15,7 @@ from modeling.files.tables import read_table
 from rig.hand.sample import Sample
 from rig.hand.settings import SCRIPTS, HandSettings
 from rig.hand.tracking import REST_S
-from rig.live.memory import now_s
+from rig.live.clock import now_s, sleep
 
 RATE_HZ = 1000
 _LARGEST = 1e6  # of any number in a table
@@ -125,7 +124,7 @@ class ScriptedHand:
     def wait(self, seconds: float) -> None:
         """Until the next sample is due."""
         due_s = self._start_s + self._given / RATE_HZ - now_s()
-        time.sleep(min(max(due_s, 0.0), seconds))
+        sleep(min(max(due_s, 0.0), seconds))
 
     def read(self) -> list[Sample]:
         """The samples that are due."""

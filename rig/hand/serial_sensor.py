@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import select
 import time
 
 from modeling.errors import InputError
@@ -11,7 +10,7 @@ from modeling.extras import extra
 from rig.hand.sample import LOST_S, ConnectedDevice, DeviceLost, Sample
 from rig.hand.serial_line import LineReader, SensorClock, SensorLine
 from rig.hand.settings import HandSettings
-from rig.live.memory import now_s
+from rig.live.clock import now_s, readable
 from rig.wire.ports import opened_port, port_names, ports_listed
 
 with extra("rig"):
@@ -61,7 +60,7 @@ class SerialSensor:
     def wait(self, seconds: float) -> None:
         """Until bytes come."""
         if os.name == "posix":
-            select.select([self._port.fileno()], [], [], seconds)
+            readable(self._port.fileno(), seconds)
         else:
             time.sleep(min(seconds, _POLL_S))
 

@@ -12,7 +12,8 @@ from collections import deque
 from rig.hand.loop import HandLoop
 from rig.hand.sample import Sample
 from rig.hand.settings import HandSettings
-from rig.live.memory import Live, now_s
+from rig.live.clock import now_s, wait_for
+from rig.live.memory import Live
 
 _MOST_PUSHED = 10_000
 
@@ -37,7 +38,7 @@ class PointerDevice:
 
     def wait(self, seconds: float) -> None:
         """Until something is pushed, at the latest after this time."""
-        if self._news.wait(seconds):
+        if wait_for(self._news.wait, seconds):
             self._news.clear()
 
     def read(self) -> list[Sample]:

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import IO, Any, TypeVar
 
 from modeling.errors import InputError
+from rig.live.clock import wait_for
 from rig.live.messages import Message, Refused, decoded, received, send
 
 ANSWER_S = 5.0
@@ -134,10 +135,16 @@ class Child:
 
     def hear(self, kinds: Any, *, within_s: float | None = None) -> Any:
         """Its next message, one of these types (a union or a type); raises what `ask` does."""
-        try:
-            heard = self._heard.get(timeout=within_s)
-        except queue.Empty:
-            raise ChildLost(f"it has not answered for {within_s:g} s") from None
+        taken: list[bytes | None] = []
+
+        def take(longest_s: float | None) -> bool:
+            with suppress(queue.Empty):
+                taken.append(self._heard.get(timeout=longest_s))
+            return bool(taken)
+
+        if not (take(None) if within_s is None else wait_for(take, within_s)):
+            raise ChildLost(f"it has not answered for {within_s:g} s")
+        (heard,) = taken
         if heard is None:
             self._heard.put(None)  # for who asks next
             raise ChildLost(f"it has ended {self.end()}")
@@ -164,10 +171,14 @@ class Child:
         str
             By which signal or with which code it ended, and its last complaint.
         """
-        with suppress(subprocess.TimeoutExpired):
-            self._process.wait(END_S)
+        wait_for(self._ended, END_S)
         self.kill()
         return self._end
+
+    def _ended(self, within_s: float) -> bool:
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(within_s)
+        return not self.runs
 
     def kill(self, why: str = "") -> None:
         """End it at once."""

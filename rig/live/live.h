@@ -12,15 +12,7 @@
 #ifndef TQ_LIVE_H
 #define TQ_LIVE_H
 
-#include <stdint.h>
-#include <string.h>
-#ifdef _WIN32
-#include <windows.h>
-#elif defined __APPLE__
-#include <mach/mach_time.h>
-#else
-#include <time.h>
-#endif
+#include "clock.h"
 
 #define TQ_LIVE_FORMAT 0x7471000000000004u /* changes with anything in this file */
 #define TQ_RING 16384                      /* a power of 2; half a minute of readings or blocks */
@@ -81,41 +73,6 @@ struct tq_live {
     uint64_t block[TQ_RING][TQ_WORDS(tq_block)];
 };
 typedef struct tq_live tq_live;
-
-/* Seconds on the one clock of all processes: that of Python's time.perf_counter. */
-static inline double tq_now(void)
-{
-#ifdef _WIN32
-    LARGE_INTEGER now, rate;
-    QueryPerformanceCounter(&now);
-    QueryPerformanceFrequency(&rate);
-    return (double)now.QuadPart / (double)rate.QuadPart;
-#elif defined __APPLE__
-    mach_timebase_info_data_t base;
-    mach_timebase_info(&base);
-    return (double)mach_absolute_time() * base.numer / base.denom * 1e-9;
-#else
-    struct timespec now; /* no system call, but a page that the kernel maps */
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-#endif
-}
-
-/* A time of tq_now, written and read whole. */
-static inline void tq_put_time(uint64_t *place, double time_s)
-{
-    uint64_t word;
-    memcpy(&word, &time_s, 8);
-    __atomic_store_n(place, word, __ATOMIC_RELEASE);
-}
-
-static inline double tq_take_time(const uint64_t *place)
-{
-    uint64_t word = __atomic_load_n(place, __ATOMIC_ACQUIRE);
-    double time_s;
-    memcpy(&time_s, &word, 8);
-    return time_s;
-}
 
 static inline void tq_put(uint64_t *slot, const void *row, size_t words)
 {

@@ -20,11 +20,7 @@ from numpy.typing import NDArray
 from modeling.arrays import Floats
 from modeling.errors import InputError, shown
 from modeling.files.locks import WAIT_S, HeldError, Lock
-
-try:
-    import rig.live._live as _live
-except ImportError:  # no compiler at installation
-    _live = None
+from rig.live.compiled import compiled
 
 # Flags of a reading, and of a block.
 CONTACT, BUTTON, FORCE_ASSUMED, SIMULATED, GONE, FORCE_COMMANDED, BEYOND = 1, 2, 4, 8, 16, 32, 64
@@ -67,27 +63,6 @@ BLOCK = np.dtype(
 _PREFIX, _LOCK = "tactileq-live-", ".lock"
 _MOST_ROWS = 16384
 Rows = NDArray[np.void]
-
-
-def compiled() -> Any:
-    """The module of the compiled parts.
-
-    Raises
-    ------
-    InputError
-        If there is none: nothing in Python keeps the time of an audio callback.
-    """
-    if _live is None:
-        raise InputError(
-            "expected the compiled parts of tactileq, which a rig needs, got none; install a C "
-            "compiler (gcc or clang), then tactileq again."
-        )
-    return _live
-
-
-def now_s() -> float:
-    """Seconds on the one clock of all processes of a rig (monotonic, with an arbitrary zero)."""
-    return float(compiled().lib.tq_now())
 
 
 class Live:

@@ -3,7 +3,7 @@
 
    PortAudio calls tq_sound_callback with a tq_sound. The hand comes from shared memory; what is played
    is logged there. In the callback there is no Python, no allocation, no lock and no system call (the
-   clock is a page that the kernel maps).
+   clock is a page that the kernel maps; one that is given costs calls, once).
 
    One control thread prepares sources and selects the one to play, as in player.h, on which this is
    based. A source is a voice (a model) or a signal. Signals begin when no voice plays any more, and
@@ -26,6 +26,7 @@
 #define TQ_FRESH 64      /* readings that a block takes in at most, the latest */
 #define TQ_CLOCK_S 0.1   /* over which the times of blocks are smoothed */
 #define TQ_PAUSE_S 0.05  /* a block so much out of time begins a new sequence of them */
+#define TQ_NEXT_S 0.02   /* a given clock waits for a card that does not call for so long */
 #define TQ_UNDERFLOWED 4 /* of PortAudio: paOutputUnderflow */
 
 /* A voice with a number, by which the log knows it. */
@@ -341,6 +342,8 @@ static int tq_sound_callback(const void *in, void *out, unsigned long frames, co
     double latency_s = moments ? moments[2] - moments[1] : 0;
     tq_block block = tq_sound_block(s, tq_now(), (float *)out, frames);
     (void)in;
+    tq_take_part(1);
+    tq_expect(block.time_s + TQ_NEXT_S + 2 * (double)frames / s->rate_hz);
     block.dac_time_s = block.time_s + (latency_s > 0 && latency_s < 10 ? latency_s : 0);
     if (flags & TQ_UNDERFLOWED)
         block.flags |= TQ_UNDERFLOW;

@@ -19,8 +19,10 @@ import numpy as np
 from modeling.errors import InputError
 from modeling.rendering.compiled import filled, memory_reals, render_counters
 from modeling.rendering.plan import RenderCounters
+from rig.live.clock import now_s
+from rig.live.compiled import compiled
 from rig.live.driven import Parent
-from rig.live.memory import HEARTBEAT_S, OLDEST_READING_S, Live, compiled, now_s
+from rig.live.memory import HEARTBEAT_S, OLDEST_READING_S, Live
 from rig.live.messages import Done, Message
 from rig.sound.devices import check_rate, find_device, portaudio
 from rig.sound.messages import (

@@ -5,7 +5,6 @@ docs/method/live.md#processes
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -13,7 +12,8 @@ import numpy as np
 
 from modeling.errors import InputError
 from rig.live.child import Child, ChildLost, Reply
-from rig.live.memory import HEARTBEAT_S, Rows, now_s
+from rig.live.clock import now_s, sleep
+from rig.live.memory import HEARTBEAT_S, Rows
 from rig.live.messages import Done, Message
 from rig.sound.messages import Mask, Playing, SoundSettings
 from rig.sound.played import STALLED_S, PlayedBlocks
@@ -130,11 +130,11 @@ class SoundProcess:
             rows = self.look()
             fitting = rows[np.asarray(found(rows), dtype=bool)]
             if fitting.size:
-                time.sleep(max(0.0, float(fitting[0]["dac_time_s"]) - now_s()))
+                sleep(max(0.0, float(fitting[0]["dac_time_s"]) - now_s()))
                 return fitting[0]  # type: ignore[no-any-return]
             if self._child is not None and not self._child.runs:
                 raise ChildLost("it has ended")
-            time.sleep(_POLL_S)
+            sleep(_POLL_S)
         raise ChildLost("it plays no blocks")
 
     def look(self) -> Rows:

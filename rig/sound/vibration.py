@@ -5,7 +5,6 @@ docs/method/live.md#output
 
 from __future__ import annotations
 
-import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Self
@@ -18,7 +17,8 @@ from modeling.models.loading import AnyModel
 from modeling.rendering.limits import Limits
 from modeling.rendering.plan import RenderCounters, RenderPlan, plan_for
 from modeling.vibrators.compensation import Compensation
-from rig.live.memory import OLDEST_READING_S, Live, Rows, now_s
+from rig.live.clock import now_s, sleep
+from rig.live.memory import OLDEST_READING_S, Live, Rows
 from rig.sound.played import STALLED_S, PlayedBlocks
 from rig.sound.signal_limits import check_signal, largest_factor
 
@@ -236,7 +236,7 @@ class VibrationOutput(ABC):
         self._look()
         if self._played.pause_needed(seconds):
             self.silence()
-            time.sleep(max(0.0, self._played.silent_until_s - now_s()))
+            sleep(max(0.0, self._played.silent_until_s - now_s()))
 
     def _number(self) -> int:
         self._presentation += 1

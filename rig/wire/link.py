@@ -6,14 +6,14 @@ import queue
 import threading
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future
-from concurrent.futures import TimeoutError as FutureTimeout
+from concurrent.futures import Future, wait
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Self
 
 from modeling.errors import InputError
+from rig.live.clock import taking_part, wait_for
 from rig.wire.conversation import Block, Conversation, Hello, upload_bodies
 from rig.wire.definition import Definition, Value
 from rig.wire.transports import Transport, TransportLost
@@ -150,14 +150,13 @@ class Link:
             ) from None
         if (transport := self._transport) is not None:
             transport.wake()
-        try:
-            return command.answer.result(within_s)
-        except FutureTimeout:
+        if not wait_for(lambda s: bool(wait([command.answer], s).done), within_s):
             command.answer.cancel()
             raise InputError(
                 f"expected the device to answer within {within_s:g} s, got nothing; check its "
                 "cable and power."
-            ) from None
+            )
+        return command.answer.result()
 
     def _connect(self) -> Conversation:
         transport = self._opening()
@@ -181,8 +180,9 @@ class Link:
         current: Conversation | None = talk
         while current is not None:
             try:
-                while not self._closing.is_set():
-                    self._step(current)
+                with taking_part():
+                    while not self._closing.is_set():
+                        self._step(current)
             except TransportLost as lost:
                 self._counts["lost"] += 1
                 self._faults.append(str(lost))
@@ -217,7 +217,7 @@ class Link:
 
     def _again(self) -> Conversation | None:
         """A new connection, None once this is closed; nothing is armed."""
-        while not self._closing.wait(AGAIN_S):
+        while not wait_for(self._closing.wait, AGAIN_S):
             with suppress(InputError):
                 return self._connect()
         return None

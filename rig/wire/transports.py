@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import select
 import socket
-import time
 from contextlib import suppress
 from typing import Protocol
 
 from modeling.errors import InputError, shown
 from modeling.extras import extra
+from rig.live.clock import now_s, readable, sleep
 from rig.wire.ports import WRITE_S, opened_port
 
 with extra("rig"):
@@ -62,11 +61,11 @@ class _Waking:
 
     def until_readable(self, of: int, within_s: float) -> bool:
         """Wait until a descriptor can be read, this wakes, or the time is over; whether it can."""
-        ready, _, _ = select.select([of, self._out], [], [], within_s)
-        if self._out in ready:
+        ready, woken = readable(of, within_s, or_else=self._out)
+        if woken:
             with suppress(OSError):
                 os.read(self._out, _MOST)
-        return of in ready
+        return ready
 
     def close(self) -> None:
         for end in (self._out, self._in):
@@ -95,8 +94,8 @@ class SerialTransport:
         self._closed = False
 
     def now_s(self) -> float:
-        """Monotonic."""
-        return time.monotonic()
+        """Monotonic: the rig's."""
+        return now_s()
 
     def read(self, within_s: float) -> bytes:
         """See `Transport`."""
@@ -112,7 +111,7 @@ class SerialTransport:
             return
         end_s = self.now_s() + within_s
         while not self._port.in_waiting and self.now_s() < end_s:
-            time.sleep(_POLL_S)
+            sleep(_POLL_S)
 
     def write(self, data: bytes) -> None:
         """See `Transport`."""
@@ -168,8 +167,8 @@ class SocketTransport:
         self._closed = False
 
     def now_s(self) -> float:
-        """Monotonic."""
-        return time.monotonic()
+        """Monotonic: the rig's."""
+        return now_s()
 
     def read(self, within_s: float) -> bytes:
         """See `Transport`."""

@@ -17,7 +17,8 @@ from experiments.feel.live_rig import LiveRig
 from experiments.feel.opening import NO_SOUND, demonstration, desk
 from modeling import InputError, TextureModel, compensation_for
 from rig.force.standin import StandIn
-from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, HEARTBEAT_S, Live, now_s
+from rig.live.clock import now_s
+from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, HEARTBEAT_S, Live
 from rig.setup.rig_file import SHIPPED_RIG_FILE
 from rig.sound.devices import SoundDevice
 from rig.sound.supervision import SoundLost

@@ -93,7 +93,7 @@ def test_powers_of_independent_layers_add(drawn: tuple[Floats, int]) -> None:
 
 
 def exact_log_power(theta: Any, signs: Floats | None, tangent: Any, line_hz: float) -> Any:
-    """ln power by its equation (docs/method/equalizer.md#response), which complex numbers may enter."""
+    """ln power by its equation (docs/method/equalizer.md#response), for complex numbers."""
     m = (theta.size - 1) // 3
     noise, (frequency, bandwidth, gain) = theta[0], np.exp(theta[1:]).reshape(3, m, 1)
     seen = np.sqrt(bandwidth**2 + line_hz**2)
@@ -118,7 +118,7 @@ NEARLY_CANCELLED = (np.array([0, 7.78322402, 1.5, 0.125]), 1), [-1.0] * 4, True
 def test_derivatives(
     drawn: tuple[Floats, int], up: list[float], coherent: bool, line_hz: float
 ) -> None:
-    """By complex steps, which no difference rounds off (Squire & Trapp 1998, SIAM Review 40, 110)."""
+    """By complex steps, in which nothing cancels (Squire & Trapp 1998, SIAM Review 40, 110)."""
     theta, m = drawn
     signs = np.array(up[:m]) if coherent else None
     here = at(np.geomspace(15, 2400, 60), line_hz=line_hz)

@@ -15,7 +15,7 @@ from modeling.rendering.compiled import filled, render_counters
 from modeling.rendering.lattice import lattice_fields
 from modeling.rendering.noise import stream_key
 from modeling.rendering.plan import RenderCounters, plan_for
-from rig.live.memory import compiled
+from rig.live.compiled import compiled
 
 
 def ar_model(

@@ -12,7 +12,7 @@ import threading
 import numpy as np
 
 from rig.capture.input import AudioInput, InputSettings
-from rig.live.memory import now_s
+from rig.live.clock import now_s
 
 
 def main() -> None:

@@ -9,7 +9,7 @@ from rig.force.process import limits_of
 from rig.force.settings import ForceSettings
 from rig.force.states import Cause, ForceEvent, State
 from rig.force.wall import Wall
-from rig.live.memory import compiled
+from rig.live.compiled import compiled
 
 TICK_S = 0.001
 WALL = Wall(stiffness_n_per_mm=1.0, width_mm=80.0, length_mm=80.0)

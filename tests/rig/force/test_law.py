@@ -17,7 +17,7 @@ from rig.force.settings import ForceSettings, Pose
 from rig.force.states import SENTENCES, Cause, ForceEvent, State
 from rig.force.wall import Wall, largest_stiffness_n_per_mm
 from rig.hand.tracking import TrackingFilter
-from rig.live.memory import compiled
+from rig.live.compiled import compiled
 from tests.rig.force.law import TICK_S, WALL, Law
 
 HEADERS = Path(rig.force.__file__).parent

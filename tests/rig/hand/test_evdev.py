@@ -42,7 +42,8 @@ from rig.hand.following import Follower
 from rig.hand.loop import HandLoop
 from rig.hand.messages import Counts, Firmware, HandFault
 from rig.hand.settings import HandSettings
-from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, Live, now_s
+from rig.live.clock import now_s
+from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, Live
 
 TABLET = {"key": [BTN_TOOL_PEN, BTN_TOUCH, BTN_STYLUS], "abs": [ABS_X, ABS_Y, ABS_PRESSURE]}
 MOUSE = {"key": [BTN_LEFT], "rel": [REL_X, REL_Y]}

@@ -23,7 +23,8 @@ from rig.hand.sample import Sample
 from rig.hand.scripted import SCRIPT_COLUMNS
 from rig.hand.settings import HandSettings
 from rig.hand.window import PointerDevice
-from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, SIMULATED, Live, now_s
+from rig.live.clock import now_s
+from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, SIMULATED, Live
 from rig.sound.messages import Silence
 from tests.refusals import refused
 from tests.rig.waiting import is_gone, wait_until

@@ -13,7 +13,8 @@ from modeling.rendering.limits import Limits
 from modeling.rendering.noise import stream_key
 from modeling.rendering.plan import RenderPlan, plan_for
 from modeling.vibrators.exposure import hand_arm_sections
-from rig.live.memory import CONTACT, OLDEST_READING_S, Live, Rows, compiled
+from rig.live.compiled import compiled
+from rig.live.memory import CONTACT, OLDEST_READING_S, Live, Rows
 from stimuli.planted.textures import planted_texture
 from tests.modeling.rendering.lattices import planted_ar
 

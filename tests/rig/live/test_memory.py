@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from modeling import InputError
 from modeling.errors import shown
 from rig.live import memory
-from rig.live.memory import BLOCK, CONTACT, READING, Live, now_s
+from rig.live.clock import now_s
+from rig.live.memory import BLOCK, CONTACT, READING, Live
 from tests.refusals import refused
 
 ROOT = Path(__file__).parents[3]

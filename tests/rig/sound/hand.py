@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 import time
 
-from rig.live.memory import CONTACT, Live, now_s
+from rig.live.clock import now_s
+from rig.live.memory import CONTACT, Live
 
 live = Live.attach(sys.argv[1])
 while True:

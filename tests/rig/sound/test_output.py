@@ -21,7 +21,8 @@ from scipy.signal import lfilter
 from modeling import InputError
 from modeling.rendering.limits import Limits
 from modeling.rendering.plan import RELEASE_S
-from rig.live.memory import BLOCK, CONTACT, GONE, HEARTBEAT_S, NO_HEARTBEAT, STALE, Live, now_s
+from rig.live.clock import now_s
+from rig.live.memory import BLOCK, CONTACT, GONE, HEARTBEAT_S, NO_HEARTBEAT, STALE, Live
 from rig.sound.output import SoundOutput
 from rig.sound.supervision import SoundLost
 from tests.modeling.rendering.lattices import planted_ar

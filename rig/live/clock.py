@@ -1,0 +1,130 @@
+"""The one clock of all processes of a rig: waiting by it, and giving it from outside (clock.h).
+
+docs/method/live.md#clock
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import select
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Self
+
+from modeling.errors import InputError
+from rig.live.compiled import compiled, is_compiled
+
+VARIABLE = "TACTILEQ_CLOCK"  # the file of a clock that is given to a process and its children
+SLICE_S = 1e-3
+
+
+def now_s() -> float:
+    """Seconds on the one clock of all processes of a rig (monotonic, with an arbitrary zero)."""
+    return float(compiled().lib.tq_now()) if is_compiled() else time.perf_counter()
+
+
+def is_given() -> bool:
+    """Whether the clock is one that is given from outside, for what is simulated."""
+    return is_compiled() and bool(compiled().lib.tq_clock_given())
+
+
+def sleep(seconds: float) -> None:
+    """Wait for so long (s; none below 0)."""
+    if not is_given():
+        time.sleep(max(0.0, seconds))
+    elif seconds > 0:
+        compiled().lib.tq_sleep_until(now_s() + seconds)
+
+
+def wait_for(wait: Callable[[float], bool], within_s: float) -> bool:
+    """What `wait` of an event, a lock or a future returns, called with the longest time to wait."""
+    if not is_given():
+        return wait(within_s)
+    end_s = now_s() + within_s
+    while not wait(0):
+        if now_s() >= end_s:
+            return False
+        sleep(SLICE_S)
+    return True
+
+
+def readable(of: int, within_s: float, *, or_else: int = -1) -> tuple[bool, bool]:
+    """Wait until one of two descriptors can be read (−1: none), or the time is over; which can."""
+    if is_given():
+        found = compiled().lib.tq_wait_readable(of, or_else, now_s() + within_s)
+        return bool(found & 1), bool(found & 2)
+    both = [one for one in (of, or_else) if one >= 0]
+    ready, _, _ = select.select(both, [], [], within_s)
+    return of in ready, or_else in ready
+
+
+@contextmanager
+def taking_part() -> Iterator[None]:
+    """A given clock waits for this thread meanwhile, wherever it does not wait for the clock."""
+    compiled().lib.tq_take_part(1)
+    try:
+        yield
+    finally:
+        compiled().lib.tq_take_part(0)
+
+
+def check_clock(what: str, *, simulated: bool) -> None:
+    """Refuse to run anything but what is simulated by a given clock.
+
+    Raises
+    ------
+    InputError
+        For a real one: a clock that stands still would let it push or play on.
+    """
+    if is_given() and not simulated:
+        raise InputError(
+            f"expected the computer's clock for {what}, got the one of {VARIABLE}; unset that "
+            "variable."
+        )
+
+
+class GivenClock:
+    """A clock for this process and those that it starts, while this is open; Linux only.
+
+    It goes as the computer's does, and stands still while anybody who takes part is late. A process
+    that goes on afterwards has the computer's clock from the same moment on.
+    """
+
+    def __init__(self) -> None:
+        self._library = compiled().lib
+        folder = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+        handle, name = tempfile.mkstemp(prefix="tactileq-clock-", dir=folder)
+        self.path = Path(name)
+        os.truncate(handle, self._library.tq_clock_size())
+        self._memory = mmap.mmap(handle, self._library.tq_clock_size())
+        os.close(handle)
+        self._buffer = compiled().ffi.from_buffer(self._memory, require_writable=True)
+        self._address = compiled().ffi.cast("void *", self._buffer)
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    @property
+    def hung(self) -> int:
+        """How many threads were given up, each after 10 s in which all waited for it."""
+        return int(self._library.tq_clock_hung(self._address))
+
+    def _run(self) -> None:
+        self._library.tq_clock_run(self._address)
+
+    def __enter__(self) -> Self:
+        self._library.tq_clock_start(self._address)
+        self._thread.start()
+        os.environ[VARIABLE] = str(self.path)
+        self._library.tq_clock_take(os.fsencode(self.path))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._library.tq_clock_end(self._address)
+        self._thread.join()
+        self._library.tq_clock_take(compiled().ffi.NULL)
+        os.environ.pop(VARIABLE, None)
+        self.path.unlink()
