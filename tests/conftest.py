@@ -336,7 +336,7 @@ class JackServer:
 
 
 @pytest.fixture
-def jack_server() -> Callable[..., AbstractContextManager[JackServer]]:
+def jack_server(given_clock: None) -> Callable[..., AbstractContextManager[JackServer]]:
     """`with jack_server(block=128) as server:` an audio server without a sound card; see
     `JackServer`. This process and its children find it meanwhile."""
     return _jack_server

@@ -13,7 +13,7 @@ from rig.force.settings import ForceSettings
 from rig.hand.messages import Report
 from rig.hand.settings import HandSettings
 from rig.live.child import ChildLost
-from rig.live.clock import now_s
+from rig.live.clock import next_of, now_s
 from rig.live.memory import Live
 
 ANSWER_S = 20.0  # an upload through a slow port
@@ -51,17 +51,14 @@ class DeviceHand(ForceHand):
             end_s = now_s() + within_s
             while now_s() < end_s and child.runs:
                 self._live.heartbeat()
-                try:
-                    answer = self._answers.get(timeout=_LOOK_S)
-                except queue.Empty:
-                    continue
-                if answer.number != self._number:
-                    continue
-                if answer.lost:
-                    raise ChildLost("no device at its end")
-                if answer.sentence:
-                    raise InputError(answer.sentence)
-                return answer
+                for answer in next_of(self._answers, _LOOK_S):
+                    if answer.number != self._number:
+                        continue
+                    if answer.lost:
+                        raise ChildLost("no device at its end")
+                    if answer.sentence:
+                        raise InputError(answer.sentence)
+                    return answer
             raise ChildLost("it does not answer" if child.runs else "it has ended")
 
     def _take(self, report: Any) -> None:

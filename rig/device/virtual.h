@@ -138,6 +138,7 @@ static int tq_virtual_run(tq_virtual *v, int port, int end, int other)
     memset(on, 0, sizeof on);
     on[0].fd = port, on[1].fd = end, on[2].fd = other;
     on[1].events = on[2].events = POLLIN;
+    tq_clock_take(getenv("TACTILEQ_CLOCK"));
     tq_take_part(1);
     for (;;) {
         ssize_t count = 0;

@@ -111,6 +111,7 @@ static tq_standin *tq_standin_find(void)
     void *memory;
     if (tq_the_device)
         return tq_the_device;
+    tq_clock_take(getenv("TACTILEQ_CLOCK"));
     tq_the_file = path ? open(path, O_RDWR) : -1;
     if (tq_the_file < 0)
         return NULL;

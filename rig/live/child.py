@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import IO, Any, TypeVar
 
 from modeling.errors import InputError
-from rig.live.clock import wait_for
+from rig.live.clock import next_of, wait_for
 from rig.live.messages import Message, Refused, decoded, received, send
 
 ANSWER_S = 5.0
@@ -135,14 +135,8 @@ class Child:
 
     def hear(self, kinds: Any, *, within_s: float | None = None) -> Any:
         """Its next message, one of these types (a union or a type); raises what `ask` does."""
-        taken: list[bytes | None] = []
-
-        def take(longest_s: float | None) -> bool:
-            with suppress(queue.Empty):
-                taken.append(self._heard.get(timeout=longest_s))
-            return bool(taken)
-
-        if not (take(None) if within_s is None else wait_for(take, within_s)):
+        taken = (self._heard.get(),) if within_s is None else next_of(self._heard, within_s)
+        if not taken:
             raise ChildLost(f"it has not answered for {within_s:g} s")
         (heard,) = taken
         if heard is None:

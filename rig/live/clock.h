@@ -6,7 +6,7 @@
    of them wait for it. A busy computer makes it slow; order and durations stay. It is for what is simulated
    (docs/method/live.md#clock): nothing that can push or play a real device accepts it.
 
-   It is a file in memory whose path stands in TACTILEQ_CLOCK. Linux only.
+   It is a file in memory, of whose path TACTILEQ_CLOCK tells a process. Linux only.
 
    Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
 
@@ -84,13 +84,18 @@ static inline void tq_take_part(int takes)
     (void)takes;
 }
 
-TQ_INNER void tq_expect(double time_s)
+TQ_INNER double tq_expect(double time_s)
 {
-    (void)time_s;
+    return time_s;
 }
 
 TQ_INNER void tq_know_place(void)
 {
+}
+
+TQ_INNER void tq_called(double next_s)
+{
+    (void)next_s;
 }
 
 /* Returns at the moment, or soon after. */
@@ -151,21 +156,23 @@ static inline uint64_t tq_clock_hung(const void *clock)
 #include <linux/futex.h>
 #include <poll.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <sys/mman.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
 #define TQ_PLACES 64
 #define TQ_SLICE_S 1e-3   /* who waits for another process looks as often at least */
+#define TQ_LEAST_S 1e-5   /* each wait: who asks again and again whether it is time lets it pass */
 #define TQ_HANGS_S 10.0   /* who is late for so long, by the computer's clock, is waited for no longer */
+#define TQ_BEHIND_S 0.01  /* a computer that is late for no longer costs no time */
+#define TQ_CALLED_S 1.0   /* who is called by others, for so long: a sound server may have died */
 #define TQ_UNKNOWN_S 0.02 /* who is late for so long may have ended, or be suspended on purpose */
 
 /* Who takes part: a thread, and until when it needs nothing. */
 struct tq_place {
     uint64_t who;   /* process << 32 | thread; 0: free */
     uint64_t until; /* by tq_put_time */
-    uint32_t woken, spare;
+    uint32_t woken, called; /* called: it does not come by itself */
 };
 typedef struct tq_place tq_place;
 
@@ -178,15 +185,15 @@ struct tq_clock {
 typedef struct tq_clock tq_clock;
 
 static tq_clock *tq_the_clock;
-static int tq_clock_is_known;
 static __thread tq_place *tq_own_place;
 
-/* Takes the clock at this path from now on, or the computer's (NULL); not 0 where there is none. */
+/* Takes the clock at this path from now on, or the computer's (NULL); not 0 where there is none. Each
+   library that a process loads has to be told. */
 static inline int tq_clock_take(const char *path)
 {
     int file = path ? open(path, O_RDWR | O_CLOEXEC) : -1;
     void *memory;
-    tq_clock_is_known = 1, tq_the_clock = NULL, tq_own_place = NULL;
+    tq_the_clock = NULL, tq_own_place = NULL;
     if (file < 0)
         return path != NULL;
     memory = mmap(NULL, sizeof(tq_clock), PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
@@ -195,22 +202,15 @@ static inline int tq_clock_take(const char *path)
     return tq_the_clock == NULL;
 }
 
-TQ_INNER tq_clock *tq_clock_now(void)
-{
-    if (!tq_clock_is_known)
-        tq_clock_take(getenv("TACTILEQ_CLOCK"));
-    return tq_the_clock;
-}
-
 /* Whether the clock is given from outside. */
 static inline int tq_clock_given(void)
 {
-    return tq_clock_now() != NULL;
+    return tq_the_clock != NULL;
 }
 
 static inline double tq_now(void)
 {
-    const tq_clock *clock = tq_clock_now();
+    const tq_clock *clock = tq_the_clock;
     if (!clock)
         return tq_computer_now();
     if (__atomic_load_n(&clock->ended, __ATOMIC_ACQUIRE))
@@ -226,7 +226,7 @@ TQ_INNER uint64_t tq_this_thread(void)
 /* Has this library, too, know whether this thread is waited for: each has pointers of its own. */
 TQ_INNER void tq_know_place(void)
 {
-    tq_clock *clock = tq_clock_now();
+    tq_clock *clock = tq_the_clock;
     uint64_t who = clock ? tq_this_thread() : 0;
     int n;
     tq_own_place = NULL;
@@ -235,13 +235,13 @@ TQ_INNER void tq_know_place(void)
             tq_own_place = &clock->place[n];
 }
 
-/* From now on this thread is waited for (1), or no longer (0). */
+/* From now on this thread is waited for (1; 2 where it is called by others), or no longer (0). */
 static inline void tq_take_part(int takes)
 {
-    tq_clock *clock = tq_clock_now();
+    tq_clock *clock = tq_the_clock;
     uint64_t who;
     int n;
-    if (!clock || takes == (tq_own_place != NULL))
+    if (!clock || !takes == !tq_own_place)
         return;
     who = tq_this_thread();
     if (!takes) {
@@ -256,17 +256,21 @@ static inline void tq_take_part(int takes)
         tq_put_time(&clock->place[n].until, tq_now() + 1e9); /* until it says more */
         if (__atomic_compare_exchange_n(&clock->place[n].who, &nobody, who, 0, __ATOMIC_ACQ_REL, __ATOMIC_RELAXED)) {
             tq_own_place = &clock->place[n];
+            tq_own_place->called = takes == 2;
             tq_put_time(&tq_own_place->until, tq_now());
             return;
         }
     }
 }
 
-/* This thread comes back by then, and is waited for if it does not: for who is called, like a sound card. */
-TQ_INNER void tq_expect(double time_s)
+/* This thread comes back by then, or a little later, and is waited for if it does not; when. */
+TQ_INNER double tq_expect(double time_s)
 {
+    double least_s = tq_now() + TQ_LEAST_S;
+    time_s = time_s < least_s ? least_s : time_s;
     if (tq_own_place)
         tq_put_time(&tq_own_place->until, time_s);
+    return time_s;
 }
 
 TQ_INNER void tq_doze(long nanoseconds)
@@ -280,14 +284,14 @@ static inline void tq_sleep_until(double time_s)
 {
     const struct timespec longest = { 0, 20000000 };
     struct timespec until;
-    if (!tq_clock_now()) {
+    if (!tq_the_clock) {
         until.tv_sec = (time_t)time_s;
         until.tv_nsec = (long)(1e9 * (time_s - (double)until.tv_sec));
         while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL) == EINTR) {
         }
         return;
     }
-    tq_expect(time_s);
+    time_s = tq_expect(time_s);
     while (tq_now() < time_s) {
         if (tq_own_place && !__atomic_load_n(&tq_the_clock->ended, __ATOMIC_ACQUIRE)) {
             uint32_t woken = __atomic_load_n(&tq_own_place->woken, __ATOMIC_ACQUIRE);
@@ -306,17 +310,17 @@ TQ_INNER int tq_poll_until(struct pollfd *on, nfds_t count, double time_s)
     struct timespec wait = { 0, 0 };
     double left_s = time_s - tq_now();
     int found;
-    if (!tq_clock_now()) {
+    if (!tq_the_clock) {
         left_s = left_s < 0 ? 0 : left_s;
         wait.tv_sec = (time_t)left_s, wait.tv_nsec = (long)(1e9 * (left_s - (double)wait.tv_sec));
-        return ppoll(on, count, &wait, NULL);
+        return (int)syscall(SYS_ppoll, on, count, &wait, NULL, 0);
     }
     if (left_s > TQ_SLICE_S)
         time_s -= left_s - TQ_SLICE_S;
-    tq_expect(time_s);
-    wait.tv_nsec = 100000;
+    time_s = tq_expect(time_s);
     do {
-        found = ppoll(on, count, &wait, NULL);
+        wait.tv_nsec = 100000; /* the kernel leaves the rest in it */
+        found = (int)syscall(SYS_ppoll, on, count, &wait, NULL, 0);
     } while (found == 0 && tq_now() < time_s);
     return found;
 }
@@ -335,6 +339,13 @@ static inline int tq_wait_readable(int one, int other, double time_s)
         if (found || tq_now() >= time_s)
             return (on[0].revents != 0) | (on[1].revents != 0) << 1;
     }
+}
+
+/* Who is called by others, like a sound card, tells when the next call is due. */
+TQ_INNER void tq_called(double next_s)
+{
+    tq_take_part(2);
+    tq_expect(next_s);
 }
 
 /* --- Who gives the clock ------------------------------------------------------------------------- */
@@ -375,8 +386,9 @@ TQ_INNER double tq_earliest(tq_clock *clock, double *absent, double now_s, doubl
         if (!who || until_s >= first_s || until_s == absent[n])
             continue;
         if (until_s <= now_s && late_s > TQ_UNKNOWN_S) {
-            int comes = tq_can_come(who, &state), hangs = comes && late_s > TQ_HANGS_S;
-            if (!comes || hangs) {
+            int comes = tq_can_come(who, &state), called = place->called && late_s > TQ_CALLED_S;
+            int hangs = comes && late_s > TQ_HANGS_S;
+            if (!comes || hangs || called) {
                 absent[n] = until_s;
                 __atomic_add_fetch(&clock->hung, (uint64_t)hangs, __ATOMIC_RELEASE);
                 if (state == 'X' || state == 'Z')
@@ -406,20 +418,23 @@ TQ_INNER void tq_wake(tq_clock *clock, double now_s, double before_s)
 static void tq_clock_run(void *clock)
 {
     tq_clock *c = (tq_clock *)clock;
-    double now_s = tq_take_time(&c->now), seen_s = tq_computer_now(), late_s = 0;
+    double now_s = tq_take_time(&c->now), seen_s = tq_computer_now(), late_s = 0, behind_s = 0, step_s;
     double absent[TQ_PLACES] = { 0 };
     while (!__atomic_load_n(&c->ended, __ATOMIC_ACQUIRE)) {
         double first_s = tq_earliest(c, absent, now_s, late_s), real_s = tq_computer_now(), before_s = now_s;
-        double step_s = real_s - seen_s; /* as far as the computer's clock has gone, but one slice at most */
-        seen_s = real_s;
+        behind_s += real_s - seen_s; /* the computer's clock; a little of it is caught up */
+        step_s = behind_s < TQ_SLICE_S ? behind_s : TQ_SLICE_S;
         if (first_s <= now_s) {
-            late_s += step_s;
+            late_s += real_s - seen_s;
+            seen_s = real_s;
+            behind_s = behind_s < TQ_BEHIND_S ? behind_s : TQ_BEHIND_S;
             tq_doze(30000);
             continue;
         }
-        late_s = 0;
-        now_s += step_s < TQ_SLICE_S ? step_s : TQ_SLICE_S;
-        now_s = now_s < first_s ? now_s : first_s;
+        late_s = 0, seen_s = real_s;
+        now_s = now_s + step_s < first_s ? now_s + step_s : first_s;
+        behind_s -= now_s - before_s;
+        behind_s = behind_s < TQ_BEHIND_S ? behind_s : TQ_BEHIND_S;
         tq_put_time(&c->now, now_s);
         tq_wake(c, now_s, before_s);
         if (now_s < first_s)

@@ -7,20 +7,22 @@ from __future__ import annotations
 
 import mmap
 import os
+import queue
 import select
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Self
+from typing import Self, TypeVar
 
 from modeling.errors import InputError
-from rig.live.compiled import compiled, is_compiled
+from rig.live.compiled import CLOCK, compiled, is_compiled
 
-VARIABLE = "TACTILEQ_CLOCK"  # the file of a clock that is given to a process and its children
 SLICE_S = 1e-3
+
+Item = TypeVar("Item")
 
 
 def now_s() -> float:
@@ -35,10 +37,10 @@ def is_given() -> bool:
 
 def sleep(seconds: float) -> None:
     """Wait for so long (s; none below 0)."""
-    if not is_given():
+    if is_given():
+        compiled().lib.tq_sleep_until(now_s() + max(0.0, seconds))
+    else:
         time.sleep(max(0.0, seconds))
-    elif seconds > 0:
-        compiled().lib.tq_sleep_until(now_s() + seconds)
 
 
 def wait_for(wait: Callable[[float], bool], within_s: float) -> bool:
@@ -51,6 +53,19 @@ def wait_for(wait: Callable[[float], bool], within_s: float) -> bool:
             return False
         sleep(SLICE_S)
     return True
+
+
+def next_of(waiting: queue.Queue[Item], within_s: float) -> tuple[Item, ...]:
+    """What comes next in a queue, in a tuple; nothing after this time."""
+    taken: list[Item] = []
+
+    def take(longest_s: float) -> bool:
+        with suppress(queue.Empty):
+            taken.append(waiting.get(timeout=longest_s) if longest_s else waiting.get_nowait())
+        return bool(taken)
+
+    wait_for(take, within_s)
+    return tuple(taken)
 
 
 def readable(of: int, within_s: float, *, or_else: int = -1) -> tuple[bool, bool]:
@@ -83,7 +98,7 @@ def check_clock(what: str, *, simulated: bool) -> None:
     """
     if is_given() and not simulated:
         raise InputError(
-            f"expected the computer's clock for {what}, got the one of {VARIABLE}; unset that "
+            f"expected the computer's clock for {what}, got the one of {CLOCK}; unset that "
             "variable."
         )
 
@@ -118,7 +133,7 @@ class GivenClock:
     def __enter__(self) -> Self:
         self._library.tq_clock_start(self._address)
         self._thread.start()
-        os.environ[VARIABLE] = str(self.path)
+        os.environ[CLOCK] = str(self.path)
         self._library.tq_clock_take(os.fsencode(self.path))
         return self
 
@@ -126,5 +141,5 @@ class GivenClock:
         self._library.tq_clock_end(self._address)
         self._thread.join()
         self._library.tq_clock_take(compiled().ffi.NULL)
-        os.environ.pop(VARIABLE, None)
+        os.environ.pop(CLOCK, None)
         self.path.unlink()

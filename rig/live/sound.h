@@ -3,7 +3,7 @@
 
    PortAudio calls tq_sound_callback with a tq_sound. The hand comes from shared memory; what is played
    is logged there. In the callback there is no Python, no allocation, no lock and no system call (the
-   clock is a page that the kernel maps; one that is given costs calls, once).
+   clock is a page that the kernel maps).
 
    One control thread prepares sources and selects the one to play, as in player.h, on which this is
    based. A source is a voice (a model) or a signal. Signals begin when no voice plays any more, and
@@ -65,6 +65,7 @@ struct tq_sound {
     tq_real masking_level;
     uint64_t masking_key, position, signal_samples;
     tq_weighting weighting;
+    void (*follows)(double); /* NULL but where the clock is given: is told when the next call is due */
 };
 typedef struct tq_sound tq_sound;
 
@@ -153,6 +154,12 @@ static inline int tq_sound_uses_signal(tq_sound *s, tq_signal *c)
 static inline int tq_sound_plays(tq_sound *s)
 {
     return tq_player_playing(&s->player) || TQ_GET(&s->signal_playing);
+}
+
+/* Has a given clock wait for the callback. Before it is first called. */
+static inline void tq_sound_follow(tq_sound *s)
+{
+    s->follows = tq_called;
 }
 
 /* --- The callback ------------------------------------------------------------------------------ */
@@ -342,8 +349,8 @@ static int tq_sound_callback(const void *in, void *out, unsigned long frames, co
     double latency_s = moments ? moments[2] - moments[1] : 0;
     tq_block block = tq_sound_block(s, tq_now(), (float *)out, frames);
     (void)in;
-    tq_take_part(1);
-    tq_expect(block.time_s + TQ_NEXT_S + 2 * (double)frames / s->rate_hz);
+    if (s->follows)
+        s->follows(block.time_s + TQ_NEXT_S + 2 * (double)frames / s->rate_hz);
     block.dac_time_s = block.time_s + (latency_s > 0 && latency_s < 10 ? latency_s : 0);
     if (flags & TQ_UNDERFLOWED)
         block.flags |= TQ_UNDERFLOW;

@@ -19,7 +19,7 @@ import numpy as np
 from modeling.errors import InputError
 from modeling.rendering.compiled import filled, memory_reals, render_counters
 from modeling.rendering.plan import RenderCounters
-from rig.live.clock import now_s
+from rig.live.clock import is_given, now_s
 from rig.live.compiled import compiled
 from rig.live.driven import Parent
 from rig.live.memory import HEARTBEAT_S, OLDEST_READING_S, Live
@@ -83,6 +83,8 @@ class Player:
         self._lib.tq_sound_weigh(
             self._sound, self._ffi.from_buffer("double *", sections), len(sections)
         )
+        if is_given():
+            self._lib.tq_sound_follow(self._sound)
         self._stream = self._open(device.index, rate_hz, channels, settings.block)
         self._stream.start()
 

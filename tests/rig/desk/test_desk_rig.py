@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import replace
@@ -21,6 +20,7 @@ from rig.desk.checks import Requirements
 from rig.desk.desk_rig import DeskRig
 from rig.desk.stimuli import check_stimulus
 from rig.interface import SURFACES, TextureRig, ToneBurst
+from rig.live.clock import sleep
 from rig.live.memory import HEARTBEAT_S
 from stimuli.planted.textures import planted_texture
 from tests.modeling.rendering.lattices import planted_ar
@@ -29,6 +29,7 @@ from tests.rig.desk.rig_files import failures, rig_file
 from tests.rig.hand.board import Board, stating
 from tests.rig.hand.board import at_constant_speed as plain
 from tests.rig.planted import planted_stimulus
+from tests.rig.waiting import follow, wait_until
 
 Jack = Callable[..., AbstractContextManager[Any]]
 
@@ -45,10 +46,7 @@ def server(jack_server: Jack) -> Iterator[Any]:
 
 
 def wait(rig: DeskRig, seconds: float) -> None:
-    end_s = rig.now_s() + seconds
-    while rig.now_s() < end_s:
-        rig.read()
-        time.sleep(0.01)
+    follow(seconds, rig.read)
 
 
 def test_what_was_presented_and_what_the_hand_did_is_told(
@@ -231,7 +229,7 @@ def test_a_session_that_hangs_is_a_fault_and_the_next_presentation_plays(
 ) -> None:
     with DeskRig(rig_file(tmp_path)) as rig:
         rig.present_model(model)
-        time.sleep(HEARTBEAT_S + 0.3)
+        sleep(HEARTBEAT_S + 0.3)
         rig.read()
         rig.silence()
         (told,) = failures(rig.take_faults())
@@ -287,10 +285,10 @@ def test_a_killed_reader_is_a_fault_and_is_replaced(
         pid = rig.parts.reader.pid
         assert pid is not None
         os.kill(pid, signal.SIGKILL)
-        end = time.monotonic() + 20
-        while rig.parts.reader.pid in (pid, None) or rig.health().problems:
-            assert time.monotonic() < end
-            time.sleep(0.05)
+        wait_until(
+            lambda: rig.parts.reader.pid not in (pid, None) and not rig.health().problems,
+            every_s=0.05,
+        )
         rig.silence()
         assert failures(rig.take_faults())
         rig.present_model(model)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -14,10 +13,12 @@ import pytest
 from rig.capture.input import InputBlock
 from rig.desk.desk_rig import DeskRig
 from rig.desk.pen_process import PenLog
+from rig.live.clock import sleep
 from rig.simulated.card import DEVICE, SimulatedCard
 from rig.simulated.vibrator import SimulatedTransducers
 from stimuli.planted.textures import planted_texture
 from tests.rig.desk.rig_files import rig_file
+from tests.rig.waiting import follow
 
 Jack = Callable[..., AbstractContextManager[Any]]
 ACCELEROMETER = f"""[accelerometer]
@@ -41,13 +42,11 @@ def test_the_pen_feels_what_was_presented(jack_server: Jack, tmp_path: Path) -> 
         with DeskRig(rig_file(tmp_path, *changes)) as rig:
             assert rig.take_acceleration() == ()
             rig.present_model(model)
-            for _ in range(10):
-                rig.read()
-                time.sleep(0.1)
+            follow(1.0, rig.read, every_s=0.1)
             rig.silence()
             pieces = rig.take_acceleration()
             (record,) = rig.take_presentations()
-            time.sleep(0.3)  # nothing is kept while nothing is presented
+            sleep(0.3)  # nothing is kept while nothing is presented
             assert sum(piece.samples_g.size for piece in rig.take_acceleration()) < 4800
             assert not any("accelerometer" in fault.sentence for fault in rig.take_faults())
     assert pieces

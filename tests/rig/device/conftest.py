@@ -10,6 +10,6 @@ from rig.device.emulating import Emulator
 
 
 @pytest.fixture
-def device() -> Iterator[Emulator]:
+def device(given_clock: None) -> Iterator[Emulator]:
     with Emulator("process") as emulator:
         yield emulator

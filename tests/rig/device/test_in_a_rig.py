@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
@@ -30,7 +29,7 @@ from rig.setup.rig_file import RigFile
 from stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 from tests.rig.desk.rig_files import failures, rig_file
-from tests.rig.waiting import wait_until
+from tests.rig.waiting import follow, wait_until
 
 WALL = Wall(stiffness_n_per_mm=0.8, width_mm=100, length_mm=100)
 PREFIX = """[device]
@@ -77,9 +76,7 @@ def test_it_is_armed_by_people_and_its_records_are_readings(device: Emulator) ->
             hand.show(WALL)
         pressed(live, hand)
         seen, _ = live.readings_since(0)
-        for _ in range(30):
-            live.heartbeat()
-            time.sleep(0.02)
+        follow(0.6, live.heartbeat, every_s=0.02)
         _, rows = live.readings_since(seen)
         assert rows.size > 400  # 1000 a second
         assert set(rows["flags"]) == {CONTACT | SIMULATED | FORCE_COMMANDED}
@@ -127,10 +124,7 @@ def test_a_desk_rig_shows_its_wall_under_a_texture(
             assert str(rig.stated["HandFirmware"]).startswith("tactileq-cables 1.1")
             rig.arm()
             rig.present_model(planted_texture("PVC"))
-            end_s = time.monotonic() + 2.0
-            while time.monotonic() < end_s:
-                rig.read()
-                time.sleep(0.02)
+            follow(2.0, rig.read, every_s=0.02)
             rig.silence()
             rows = rig.take_history()
             (presentation,) = rig.take_presentations()
@@ -164,11 +158,12 @@ def test_what_a_rig_file_says_of_a_device_has_to_fit(tmp_path: Path) -> None:
     assert unused.own_device is None
 
 
-def test_an_emulated_device_that_is_not_declared_is_refused(device: Emulator) -> None:
-    settings = ForceSettings(address=device.address, rate_hz=5000, watched=False)
+def test_an_emulated_device_that_is_not_declared_is_refused() -> None:
+    settings = ForceSettings(rate_hz=5000, watched=False)
     with (
+        Emulator("process") as device,
         Live.create() as live,
         refused(InputError, expected="a board with a hand", got="an emulated one"),
-        DeviceHand(live, HandSettings(kind="force"), replace(settings, simulated=False)),
+        DeviceHand(live, HandSettings(kind="force"), replace(settings, address=device.address)),
     ):
         pass

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -18,6 +17,7 @@ from rig.desk.desk_rig import DeskRig
 from rig.desk.parts import vibration_output
 from rig.device.emulating import Emulator
 from rig.interface import Stimulus, ToneBurst
+from rig.live.clock import sleep
 from rig.live.memory import HEARTBEAT_S, Live
 from rig.setup.rig_file import RigFile
 from rig.sound.supervision import HALTED
@@ -26,6 +26,7 @@ from tests.modeling.rendering.lattices import planted_ar
 from tests.refusals import refused
 from tests.rig.desk.rig_files import failures
 from tests.rig.device.test_in_a_rig import device_rig
+from tests.rig.waiting import follow
 
 RENDERS = """simulated = true
 renders = true
@@ -49,10 +50,7 @@ def opened(folder: Path, address: str) -> Iterator[DeskRig]:
 
 def polled(rig: DeskRig, seconds: float) -> None:
     """Look after the rig for so long."""
-    end_s = time.monotonic() + seconds
-    while time.monotonic() < end_s:
-        rig.read()
-        time.sleep(0.02)
+    follow(seconds, rig.read, every_s=0.02)
 
 
 def test_textures_and_tones_are_played_and_accounted_for(tmp_path: Path, device: Emulator) -> None:
@@ -89,7 +87,7 @@ def test_a_session_that_hangs_halts_what_plays(tmp_path: Path, device: Emulator)
     rig = rendering_rig(tmp_path, device.address)
     with Live.create() as live, vibration_output(rig, live) as sound:
         sound.play_signal(0.1 * np.ones(int(2.5 * RATE_HZ)))
-        time.sleep(HEARTBEAT_S + 0.3)
+        sleep(HEARTBEAT_S + 0.3)
         assert HALTED in sound.faults()
         assert sound.halted
         _, rows = live.blocks_since(0)
@@ -168,12 +166,13 @@ def test_visitors_feel_it_too(tmp_path: Path, device: Emulator) -> None:
     rendering_rig(tmp_path, device.address)
     with desk(tmp_path / "rig.toml") as felt:
         felt.present_model(planted_texture("canvas"))
-        end_s = time.monotonic() + 1.5
         outputs = []
-        while time.monotonic() < end_s:
+
+        def look() -> None:
             assert felt.take_faults() == ()
             outputs.append(felt.output())
-            time.sleep(0.05)
+
+        follow(1.5, look, every_s=0.05)
         felt.silence()
     assert max(one.rms_g for one in outputs if one is not None) > 0.01
     assert "simulated force device" in felt.notes

@@ -11,7 +11,7 @@ from rig.force.standin import StandIn
 
 
 @pytest.fixture
-def device(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[StandIn]:
+def device(given_clock: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[StandIn]:
     """The stand-in's device, which the processes of this test open."""
     path = tmp_path / "device"
     monkeypatch.setenv("TACTILEQ_STANDIN", str(path))

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import json
 import sys
-import time
 
 from rig.desk.desk_rig import DeskRig
 from rig.force.hand import ForceHand
+from rig.live.clock import sleep, taking_part
 from rig.setup.rig_file import RigFile
 from stimuli.planted.textures import planted_texture
 
@@ -27,8 +27,9 @@ with DeskRig(RigFile.load(sys.argv[1]), override="a test") as rig:
         "live": str(rig.parts.live.path),
     }
     print(json.dumps(told), flush=True)
-    while True:
-        time.sleep(0.02)
-        rig.read()
-        for fault in rig.take_faults():
-            print(fault.sentence, flush=True)
+    with taking_part():
+        while True:
+            sleep(0.02)
+            rig.read()
+            for fault in rig.take_faults():
+                print(fault.sentence, flush=True)

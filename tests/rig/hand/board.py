@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import threading
-import time
 import tty
 from collections.abc import Callable
 from contextlib import suppress
 from itertools import count
 
 from rig.hand.serial_line import SensorLine, crc, encode
+from rig.live.clock import now_s, sleep, taking_part
 
 PERIOD_US = 2000
 
@@ -59,12 +59,13 @@ class Board:
         self._thread.start()
 
     def _run(self, line: Callable[[int], bytes]) -> None:
-        start_s = time.monotonic()
-        for number in count():
-            wait_s = start_s + number * PERIOD_US * 1e-6 - time.monotonic()
-            if self._stop.wait(max(wait_s, 0)):
-                return
-            self.write(line(number))
+        start_s = now_s()
+        with taking_part():
+            for number in count():
+                sleep(start_s + number * PERIOD_US * 1e-6 - now_s())
+                if self._stop.is_set():
+                    return
+                self.write(line(number))
 
     def quiet(self) -> None:
         self._stop.set()

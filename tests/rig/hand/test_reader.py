@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -23,12 +22,13 @@ from rig.hand.sample import Sample
 from rig.hand.scripted import SCRIPT_COLUMNS
 from rig.hand.settings import HandSettings
 from rig.hand.window import PointerDevice
-from rig.live.clock import now_s
+from rig.live.clock import now_s, sleep
 from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, SIMULATED, Live
 from rig.sound.messages import Silence
 from tests.refusals import refused
-from tests.rig.waiting import is_gone, wait_until
+from tests.rig.waiting import follow, is_gone, wait_until
 
+pytestmark = pytest.mark.usefixtures("given_clock")
 HOLD = HandSettings(kind="scripted", script="hold", speed_mm_s=120.0, force_n=2.0)
 
 
@@ -175,6 +175,7 @@ def test_who_watches_does_not_kill_for_time_in_which_it_was_held_up_itself(
     reader._child = Process()  # type: ignore[assignment]
     reader._alive_s = 0.0
     monkeypatch.setattr("rig.hand.reader.now_s", lambda: now[0])
+    monkeypatch.setattr("rig.hand.reader.wait_for", lambda wait, seconds: wait(seconds))
     reader._watch()
     assert killed_s == [31.1]  # no reading for over a second in which it looked
 
@@ -186,7 +187,7 @@ def test_the_hand_is_read_on_while_this_process_holds_pythons_lock(live: Live) -
         first, written = reader.pid, live.readings_written
         sleep_us(1_500_000)
         meanwhile = live.readings_written - written
-        time.sleep(0.3)  # who watches wakes up, and finds a process that lives
+        sleep(0.3)  # who watches wakes up, and finds a process that lives
         assert meanwhile > 100
         assert (reader.pid, reader.faults()) == (first, ())
 
@@ -284,9 +285,11 @@ def test_a_window_pushes_pixels_and_force_is_assumed(live: Live) -> None:
     window = HandSettings(kind="window", counts_per_mm=4.0, assumed_force_n=1.0)
     with HandReader(live, window) as reader:
         start_s = now_s()
-        while now_s() < start_s + 0.3:
-            reader.push(1000 * (now_s() - start_s), 0.0, button=True)
-            time.sleep(0.005)
+        follow(
+            0.3,
+            lambda: reader.push(1000 * (now_s() - start_s), 0.0, button=True),
+            every_s=0.005,
+        )
         _, rows = live.readings_since(0)
         touching = rows[rows["flags"] == CONTACT | BUTTON | FORCE_ASSUMED]
         assert np.median(touching["speed_mm_s"][20:]) == pytest.approx(250, rel=0.05)

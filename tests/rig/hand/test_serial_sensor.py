@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import signal
-import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 
@@ -20,6 +19,7 @@ from rig.hand.sample import DeviceLost
 from rig.hand.serial_line import SensorLine, encode
 from rig.hand.serial_sensor import SerialSensor
 from rig.hand.settings import HandSettings
+from rig.live.clock import sleep
 from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, Live
 from rig.wire import ports
 from tests.refusals import refused
@@ -28,7 +28,7 @@ from tests.rig.waiting import is_gone, wait_until
 
 
 @pytest.fixture
-def board() -> Iterator[Board]:
+def board(given_clock: None) -> Iterator[Board]:
     board = Board()
     yield board
     board.unplug()
@@ -152,7 +152,7 @@ def hold_up(reader: HandReader, live: Live, *, seconds: float) -> list[str]:
     """Stop the hand's process, let it go on, and wait for readings; what was told meanwhile."""
     assert reader.pid is not None
     os.kill(reader.pid, signal.SIGSTOP)
-    time.sleep(seconds)
+    sleep(seconds)
     written, told = live.readings_written, list[str]()
     os.kill(reader.pid, signal.SIGCONT)
     wait_until(lambda: bool(told.extend(reader.faults()) or told))

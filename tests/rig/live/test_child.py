@@ -175,7 +175,8 @@ def test_its_rooms_are_those_of_its_parent_though_not_installed_and_though_files
     for room in ("modeling", "rig/live"):
         kept_out = shutil.ignore_patterns("__pycache__", "[a-z]*")  # but __init__.py
         shutil.copytree(ROOT / room, house / room, ignore=kept_out)
-    names = ("rig/__init__", "rig/live/child", "rig/live/driven", "rig/live/messages")
+    names = ["rig/__init__"]
+    names += [f"rig/live/{name}" for name in ("child", "clock", "compiled", "driven", "messages")]
     for file in (f"{name}.py" for name in (*names, "modeling/face", "modeling/errors")):
         shutil.copy(ROOT / file, house / file)
     (house / "rig/telling.py").write_text(

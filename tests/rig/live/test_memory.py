@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 
 from modeling import InputError
 from modeling.errors import shown
-from rig.live import memory
+from rig.live import memory as live_memory
 from rig.live.clock import now_s
+from rig.live.compiled import compiled
 from rig.live.memory import BLOCK, CONTACT, READING, Live
 from tests.refusals import refused
 
@@ -36,7 +37,7 @@ def write(live: Live, first: int, count: int) -> None:
 
 
 def test_rows_have_the_layout_of_the_header() -> None:
-    ffi = memory.compiled().ffi
+    ffi = compiled().ffi
     for name, kind in (("tq_reading", READING), ("tq_block", BLOCK)):
         fields = dict(ffi.typeof(name).fields)
         assert list(fields) == list(kind.names or ())
@@ -136,7 +137,7 @@ def test_no_reader_sees_half_a_row_of_a_writer_that_races_ahead() -> None:
 def test_a_reader_who_is_overtaken_gets_no_row_under_way(tmp_path: Path) -> None:
     """At every load of a copy in turn: a row and a half are written there (overtaken.c)."""
     program = tmp_path / "overtaken"
-    source, headers = Path(__file__).with_name("overtaken.c"), Path(memory.__file__).parent
+    source, headers = Path(__file__).with_name("overtaken.c"), Path(live_memory.__file__).parent
     command = ["gcc", "-std=gnu11", "-O1", f"-I{headers}", str(source), "-o", str(program)]
     subprocess.run(command, check=True)
     told = subprocess.run([program], check=True, capture_output=True, text=True).stdout
@@ -168,12 +169,12 @@ def test_another_file_is_refused(tmp_path: Path, size: int | None) -> None:
 
 def test_the_clock_is_the_same_in_every_process() -> None:
     before = now_s()
-    command = [sys.executable, "-c", "from rig.live.memory import now_s; print(now_s())"]
+    command = [sys.executable, "-c", "from rig.live.clock import now_s; print(now_s())"]
     there = float(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
     assert before < there < now_s()
 
 
 def test_without_compiled_parts_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(memory, "_live", None)
+    monkeypatch.setattr("rig.live.compiled._live", None)
     with refused(InputError, expected="compiled", got=["none", "C compiler"]):
         Live.create()

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import sys
-import time
 
-from rig.live.clock import now_s
+from rig.live.clock import now_s, sleep, taking_part
 from rig.live.memory import CONTACT, Live
 
 live = Live.attach(sys.argv[1])
-while True:
-    live.write_reading(now_s(), 0.0, y_mm=0.0, speed_mm_s=200.0, force_n=1.5, flags=CONTACT)
-    time.sleep(0.002)
+with taking_part():
+    while True:
+        live.write_reading(now_s(), 0.0, y_mm=0.0, speed_mm_s=200.0, force_n=1.5, flags=CONTACT)
+        sleep(0.002)

@@ -6,13 +6,13 @@ To a line "play" it plays anew, to "hang" it says so and hangs; faults it writes
 from __future__ import annotations
 
 import json
-import select
 import sys
 import time
 
 import numpy as np
 
 from modeling.rendering.limits import Limits
+from rig.live.clock import readable
 from rig.live.memory import Live
 from rig.sound.output import SoundOutput
 
@@ -27,7 +27,7 @@ sound.open()
 sound.play_signal(SIGNAL_G)
 print(json.dumps({"sound": sound.pid, "live": str(live.path)}), flush=True)
 while True:
-    if select.select([sys.stdin], [], [], 0.05)[0]:
+    if readable(0, 0.05)[0]:
         line = sys.stdin.readline().strip()
         if line == "play":
             sound.play_signal(SIGNAL_G)

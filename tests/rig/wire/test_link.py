@@ -5,10 +5,9 @@ from __future__ import annotations
 import os
 import pty
 import threading
-import time
 import tty
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -18,11 +17,15 @@ from rig.device.definition import DEVICE
 from rig.device.emulating import Emulator
 from rig.device.models import device_model
 from rig.device.registers import DeviceCause, DeviceCommand, DeviceState
+from rig.live.clock import now_s, sleep, taking_part
+from rig.wire.conversation import Block
 from rig.wire.link import Link
 from rig.wire.transports import Transport, opened_transport
 from stimuli.planted.textures import planted_texture
 from tests.refusals import refused
+from tests.rig.waiting import follow
 
+pytestmark = pytest.mark.usefixtures("given_clock")
 BAUD = 1_000_000
 PATIENCE_S = 10.0
 
@@ -64,23 +67,18 @@ class Cable:
         os.close(self._device)
 
     def _run(self) -> None:
-        while not self._closing.is_set():
-            moved = False
-            with self._lock:
-                if self._ours >= 0 and not self.stalled:
-                    moved = self._pass(self._device, self._ours) | self._pass(
-                        self._ours, self._device
-                    )
-            if not moved:
-                time.sleep(0.0005)
+        with taking_part():
+            while not self._closing.is_set():
+                with self._lock:
+                    if self._ours >= 0 and not self.stalled:
+                        self._pass(self._device, self._ours)
+                        self._pass(self._ours, self._device)
+                sleep(0.0005)
 
     @staticmethod
-    def _pass(source: int, to: int) -> bool:
-        try:
+    def _pass(source: int, to: int) -> None:
+        with suppress(OSError):
             os.write(to, os.read(source, 4096))
-        except OSError:
-            return False
-        return True
 
 
 @pytest.fixture
@@ -103,10 +101,11 @@ def linked(cable: Cable) -> Iterator[Link]:
 
 
 def until(met: Callable[[], bool], *, what: str) -> None:
-    end_s = time.monotonic() + PATIENCE_S
-    while not met():
-        assert time.monotonic() < end_s, what
-        time.sleep(0.01)
+    end_s = now_s() + PATIENCE_S
+    with taking_part():
+        while not met():
+            assert now_s() < end_s, what
+            sleep(0.01)
 
 
 def running(link: Link) -> None:
@@ -156,7 +155,7 @@ def test_a_cable_that_is_pulled_is_a_fault_and_arms_nothing_when_it_is_back(
         until(lambda: not link.connected, what="the link does not notice")
         with refused(InputError, expected="device"):
             link.read("State")
-        time.sleep(0.2)
+        sleep(0.2)
         cable.plug()
         until(lambda: link.connected, what="the link does not connect again")
         assert link.read("State") == DeviceState.FAULT
@@ -170,10 +169,10 @@ def test_a_command_has_a_deadline_and_the_queue_an_end(cable: Cable) -> None:
     with linked(cable) as link:
         link.read("State")
         cable.stalled = True
-        begun_s = time.monotonic()
+        begun_s = now_s()
         with refused(InputError, expected="device"):
             link.read("State", within_s=0.2)
-        assert time.monotonic() - begun_s < 0.45
+        assert now_s() - begun_s < 0.45
         refusals: list[str] = []
 
         def ask() -> None:
@@ -194,9 +193,7 @@ def test_a_command_has_a_deadline_and_the_queue_an_end(cable: Cable) -> None:
 def test_a_hanging_control_loop_is_noticed_while_the_links_thread_lives(cable: Cable) -> None:
     with linked(cable) as link:
         running(link)
-        for _ in range(10):
-            link.beat()
-            time.sleep(0.05)
+        follow(0.5, link.beat, every_s=0.05)
         assert link.read("State") == DeviceState.RUNNING
         until(lambda: link.read("State") == DeviceState.FAULT, what="it is not noticed")
         assert link.read("Cause") == DeviceCause.HEARTBEAT
@@ -209,11 +206,13 @@ def test_records_come_without_a_gap(cable: Cable) -> None:
     with linked(cable) as link:
         running(link)
         link.write("EventRate", 1000)
-        blocks, end_s = [], time.monotonic() + 0.6
-        while time.monotonic() < end_s:
+        blocks: list[Block] = []
+
+        def look() -> None:
             link.beat()
-            time.sleep(0.01)
-            blocks += link.blocks()
+            blocks.extend(link.blocks())
+
+        follow(0.6, look)
         link.write("EventRate", 0)
         ends = [block.number + block.values.size for block in blocks]
         assert [block.number for block in blocks[1:]] == ends[:-1]
