@@ -274,9 +274,14 @@ class JackServer:
     def environment(self) -> dict[str, str]:
         return {**os.environ, "JACK_DEFAULT_SERVER": self.name, "JACK_NO_START_SERVER": "1"}
 
-    def _tool(self, *words: str) -> str:
+    def _tool(self, *words: str, within_s: float = 60) -> str:
         run = subprocess.run(
-            words, env=self.environment, capture_output=True, text=True, check=True, timeout=20
+            words,
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=within_s,
         )
         return run.stdout
 
@@ -310,7 +315,13 @@ class JackServer:
 
     def connect(self, source: str, target: str) -> None:
         """Connect an output port to an input port."""
-        self._tool("jack_connect", source, target)
+        # Where the machine is late the tool may wait forever for a notice that came before.
+        for _ in range(10):
+            with suppress(subprocess.TimeoutExpired, subprocess.CalledProcessError):
+                self._tool("jack_connect", source, target, within_s=5)
+            if target in self._tool("jack_lsp", "-c", source).split():
+                return
+        raise AssertionError(f"expected {source} to be connected to {target}")
 
     def disconnect(self, source: str, target: str) -> None:
         """Undo a connection, where there is one."""

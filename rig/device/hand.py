@@ -13,7 +13,7 @@ from rig.force.settings import ForceSettings
 from rig.hand.messages import Report
 from rig.hand.settings import HandSettings
 from rig.live.child import ChildLost
-from rig.live.clock import next_of, now_s
+from rig.live.clock import holding, next_of, now_s
 from rig.live.memory import Live
 
 ANSWER_S = 20.0  # an upload through a slow port
@@ -42,7 +42,7 @@ class DeviceHand(ForceHand):
         ChildLost
             If the process that talks to it ends, or does not answer.
         """
-        with self._asking:
+        with holding(self._asking):
             child = self._child
             if child is None:
                 raise ChildLost("it is not open")

@@ -22,7 +22,7 @@ from rig.device.messages import (
 )
 from rig.device.registers import DeviceSource
 from rig.force.settings import Vibration
-from rig.live.clock import now_s
+from rig.live.clock import holding, now_s
 from rig.live.memory import BLOCK, HEARTBEAT_S, NO_HEARTBEAT, STALE, UNDERFLOW, Live
 from rig.setup.rig_file import DEVICE_RATE_HZ
 from rig.wire.conversation import DeviceRefused
@@ -88,7 +88,7 @@ class DevicePlayer:
             case PlaySamples():
                 self._play_samples(wanted)
             case StopPlaying():
-                with self._lock:
+                with holding(self._lock):
                     self._stop()
             case CountCorrections(presentation):
                 return DeviceAnswer(number=number, counters=self._counters(presentation))
@@ -97,13 +97,13 @@ class DevicePlayer:
     def _play_model(self, wanted: PlayModel) -> None:
         self._link.write("Source", DeviceSource.NOTHING)
         self._link.upload(wanted.data, wanted.digest)
-        with self._lock:
+        with holding(self._lock):
             self._forget()
             self._before = self._corrections()
             self._begin(wanted.presentation, DeviceSource.MODEL)
 
     def _play_samples(self, wanted: PlaySamples) -> None:
-        with self._lock:
+        with holding(self._lock):
             self._link.write("Source", DeviceSource.NOTHING)
             self._forget()
             samples = np.frombuffer(wanted.samples, dtype=np.float32)
@@ -122,7 +122,7 @@ class DevicePlayer:
         self._ends, self._sent = True, self._samples.size
 
     def _counters(self, presentation: int) -> RenderCounters | None:
-        with self._lock:
+        with holding(self._lock):
             if presentation != self._presentation or not self._is_model:
                 return None
             since = np.subtract(self._corrections(), self._before).tolist()
@@ -137,7 +137,7 @@ class DevicePlayer:
         """Set up a device that is here anew: nothing plays."""
         sections = np.frombuffer(self._vibration.weighting).ravel()
         weighting = np.pad(sections, (0, 5 * SECTIONS - sections.size))
-        with self._lock:
+        with holding(self._lock):
             self._forget()
             self._link.write("Source", DeviceSource.NOTHING)
             self._link.write("Weighting", tuple(weighting.tolist()))
@@ -206,7 +206,7 @@ class DevicePlayer:
 
     def gone(self) -> None:
         """Log that there is no device while something is to be played."""
-        with self._lock:
+        with holding(self._lock):
             time_s = now_s()
             if not self._presentation or time_s - self._gone_s < GONE_S:
                 return

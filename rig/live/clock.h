@@ -165,7 +165,7 @@ static inline uint64_t tq_clock_hung(const void *clock)
 #define TQ_LEAST_S 1e-5   /* each wait: who asks again and again whether it is time lets it pass */
 #define TQ_HANGS_S 10.0   /* who is late for so long, by the computer's clock, is waited for no longer */
 #define TQ_BEHIND_S 0.01  /* a computer that is late for no longer costs no time */
-#define TQ_CALLED_S 1.0   /* who is called by others, for so long: a sound server may have died */
+#define TQ_CALLED_S 3.0   /* who is called by others, for so long: a sound server may have died */
 #define TQ_UNKNOWN_S 0.02 /* who is late for so long may have ended, or be suspended on purpose */
 
 /* Who takes part: a thread, and until when it needs nothing. */
@@ -319,7 +319,7 @@ TQ_INNER int tq_poll_until(struct pollfd *on, nfds_t count, double time_s)
         time_s -= left_s - TQ_SLICE_S;
     time_s = tq_expect(time_s);
     do {
-        wait.tv_nsec = 100000; /* the kernel leaves the rest in it */
+        wait.tv_nsec = 200000; /* the kernel leaves the rest in it */
         found = (int)syscall(SYS_ppoll, on, count, &wait, NULL, 0);
     } while (found == 0 && tq_now() < time_s);
     return found;
@@ -427,8 +427,9 @@ static void tq_clock_run(void *clock)
         if (first_s <= now_s) {
             late_s += real_s - seen_s;
             seen_s = real_s;
+            /* Who waits for others must not keep the computer busy. */
+            tq_doze(late_s < 1e-3 ? 30000 : late_s < TQ_UNKNOWN_S ? 200000 : 2000000);
             behind_s = behind_s < TQ_BEHIND_S ? behind_s : TQ_BEHIND_S;
-            tq_doze(30000);
             continue;
         }
         late_s = 0, seen_s = real_s;

@@ -79,6 +79,17 @@ def readable(of: int, within_s: float, *, or_else: int = -1) -> tuple[bool, bool
 
 
 @contextmanager
+def holding(lock: threading.Lock) -> Iterator[None]:
+    """Hold a lock; who waits for it does so by the clock."""
+    while not wait_for(lambda seconds: lock.acquire(timeout=seconds), 1.0):
+        pass
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+@contextmanager
 def taking_part() -> Iterator[None]:
     """A given clock waits for this thread meanwhile, wherever it does not wait for the clock."""
     compiled().lib.tq_take_part(1)

@@ -6,33 +6,35 @@ import random
 import signal
 import subprocess
 import sys
-import time
 
 from rig.device.definition import DEVICE
+from rig.live.clock import sleep
 from rig.wire.conversation import Conversation
 from rig.wire.transports import opened_transport
 
 BAUD = 1_000_000
 HOST = """
-import sys, time
+import sys
 from rig.device.definition import DEVICE
+from rig.live.clock import now_s, sleep, taking_part
 from rig.wire.link import Link
 from rig.wire.transports import opened_transport
 with Link(lambda: opened_transport(sys.argv[1], 1_000_000), DEVICE) as link:
     if link.read("State") == 5:
         link.write("Command", 4)
-        time.sleep(0.05)
+        sleep(0.05)
     for command in (6, 1, 2):
         link.write("Command", command)
-    begun_s = time.monotonic()
+    begun_s = now_s()
     while link.read("Force") < 0.2:
         link.beat()
-        if time.monotonic() > begun_s + 5:
+        if now_s() > begun_s + 5:
             sys.exit(f"no force: cause {link.read('Cause')}")
     print("pushes", flush=True)
-    while True:
-        link.beat()
-        time.sleep(0.02)
+    with taking_part():
+        while True:
+            link.beat()
+            sleep(0.02)
 """
 
 
@@ -50,9 +52,9 @@ def ticks_after_kill(address: str, seed: int, how: int = signal.SIGKILL) -> int:
         try:
             assert host.stdout is not None
             assert host.stdout.readline() == "pushes\n"
-            time.sleep(random.Random(seed).uniform(0.0, 0.1))
+            sleep(random.Random(seed).uniform(0.0, 0.1))
             host.send_signal(how)
-            time.sleep(0.25)
+            sleep(0.25)
         finally:
             host.kill()
     transport = opened_transport(address, BAUD)

@@ -109,9 +109,11 @@ def until(met: Callable[[], bool], *, what: str) -> None:
 
 
 def running(link: Link) -> None:
-    for command in (DeviceCommand.HOME, DeviceCommand.ARM, DeviceCommand.SHOW):
-        link.write("Command", command)
-    assert link.read("State") == DeviceState.RUNNING
+    with taking_part():
+        for command in (DeviceCommand.HOME, DeviceCommand.ARM, DeviceCommand.SHOW):
+            link.beat()
+            link.write("Command", command)
+        assert link.read("State") == DeviceState.RUNNING
 
 
 def during_arming(link: Link) -> None:
@@ -142,12 +144,11 @@ def test_a_cable_that_is_pulled_is_a_fault_and_arms_nothing_when_it_is_back(
 ) -> None:
     with linked(cable) as link:
         running(link) if what is not during_arming else None
-        pulling = threading.Timer(0.15, cable.pull)
-        pulling.start()
         if what is during_arming:
             what(link)
-            pulling.join()
+            cable.pull()
         else:
+            threading.Timer(0.15, cable.pull).start()
             with refused(InputError, expected="device"):
                 while True:
                     link.beat()

@@ -1,11 +1,10 @@
-"""The firmware in a process and in QEMU: a client of its own, killed hosts, idling, samples."""
+"""The firmware in QEMU: a client of its own, idling, samples, counted instructions."""
 
 from __future__ import annotations
 
 import os
 import re
 import shutil
-import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -13,26 +12,21 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from benches.rendering.rivals import layered_texture
-from modeling import InputError
 from rig.device.definition import DEVICE
-from rig.device.emulating import KINDS, Emulator, Kind, build_firmware, check_baud
+from rig.device.emulating import KINDS, Emulator, Kind, build_firmware
 from rig.device.models import device_model
-from rig.device.registers import DeviceCommand, DeviceSource, DeviceState
+from rig.device.registers import DeviceCommand, DeviceSource
 from rig.wire.conversation import Conversation
 from rig.wire.transports import Transport, opened_transport
-from stimuli.planted.textures import planted_texture
-from tests.refusals import refused
-from tests.rig.device.independent_client import Client
-from tests.rig.device.killing import BAUD, ticks_after_kill
-from tests.rig.device.talking import joined
-from tests.rig.device.test_models import hosts_samples
+from tests.rig.device.killing import BAUD
+from tests.rig.device.test_process import check_bits_of_the_host, check_client_of_the_page
 
 DOCS = Path(__file__).parents[3] / "docs"
 HAS_QEMU = all(map(shutil.which, ("qemu-system-arm", "arm-none-eabi-gcc")))
+pytestmark = pytest.mark.long("chips that QEMU emulates in real time")
 FAST = 4_000_000  # carries a record at every tick
 BAND = 0.2  # for other versions of the compiler
 
@@ -62,73 +56,15 @@ def device(request: pytest.FixtureRequest, once_per_run: Callable[..., Any]) -> 
         yield emulator
 
 
-@pytest.mark.parametrize("device", ["process", "stm32"], indirect=True)
+@pytest.mark.parametrize("device", ["stm32"], indirect=True)
 def test_it_renders_the_bits_of_the_host(device: Emulator) -> None:
     """In its own precision: of an STM32F405 single, against the kernel on this computer."""
-    model = planted_texture("canvas")
-    transport = opened_transport(device.address, BAUD)
-    try:
-        talk = Conversation(transport, DEVICE)
-        hello = talk.hello()
-        upload = device_model(model, hello)
-        for command in (DeviceCommand.HOME, DeviceCommand.ARM, DeviceCommand.SHOW):
-            talk.write("Command", command)
-        talk.write("EventRate", 5000 if hello.real_size == 4 else 1000)
-        talk.upload(upload.data, upload.hash)
-        talk.write("Source", DeviceSource.MODEL)
-        blocks, end_s = talk.blocks(), time.monotonic() + 1.6
-        while time.monotonic() < end_s:
-            talk.write("Heartbeat", 1)
-            talk.listen(0.02)
-            blocks += talk.blocks()
-        begin = talk.read("ModelTick")
-        talk.write("EventRate", 0)
-        talk.write("Source", DeviceSource.NOTHING)
-        talk.write("Command", DeviceCommand.STOP)
-        time.sleep(0.1)
-        talk.write("Command", DeviceCommand.CLEAR)
-    finally:
-        transport.close()
-    assert isinstance(begin, int)
-    every, values = blocks[0].every, joined(blocks)
-    host = hosts_samples(model, blocks, begin, single=hello.real_size == 4)
-    host = host[::every]
-    first = (begin - blocks[0].tick) // every
-    device_samples = values["vibration_g"][first:]
-    size = min(host.size, device_samples.size)
-    assert size > 300
-    assert np.abs(host[:size]).max() > 0.02
-    assert np.array_equal(device_samples[:size], host[:size].astype(np.float32))
-    print(f"\n{8 * hello.real_size} bits: {size} samples, all equal")
+    check_bits_of_the_host(device)
 
 
+@pytest.mark.parametrize("device", ["m7", "stm32"], indirect=True)
 def test_a_client_written_from_the_page_alone_talks_to_it(device: Emulator) -> None:
-    client = Client(device.address)
-    try:
-        assert client.hello()["SchemaHash"] == DEVICE.schema_hash
-        for command in (6, 1, 2):
-            client.write(10, bytes([command]))
-        assert client.read(8) == bytes([DeviceState.RUNNING])
-        client.write(16, (500).to_bytes(2, "little"))
-        records = client.records(0.3)
-        client.write(16, bytes(2))
-        client.write(10, bytes([5]))
-        numbers, ticks, *_, flags = zip(*records, strict=True)
-        assert list(numbers) == list(range(len(records)))
-        assert set(np.diff(ticks)) == {10}
-        assert all(flag & 32 for flag in flags)
-        time.sleep(0.1)
-        assert client.read(8) == bytes([DeviceState.FAULT])
-        client.write(10, bytes([4]))
-    finally:
-        client.close()
-
-
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
-def test_a_killed_or_stopped_host_costs_heartbeat_and_ramp(how: int) -> None:
-    """601 ticks by the device's own clock; a hundred of them: tests.rig.device.large."""
-    with Emulator("process") as emulator:
-        assert abs(ticks_after_kill(emulator.address, 3, how) - 601) <= 1
+    check_client_of_the_page(device)
 
 
 def used_s(pid: int) -> float:
@@ -194,17 +130,3 @@ def per_tick(talk: Conversation) -> float:
         talk.listen(0.02)
     mean, _ = talk.read("TickClocks")  # type: ignore[misc]
     return float(mean) / 168e6 * 1e9
-
-
-@pytest.mark.parametrize(
-    ("kind", "baud"), [("m7", 9000), ("m7", 1_515_000), ("stm32", 6_000_000), ("stm32", 0)]
-)
-def test_a_baud_rate_that_the_board_cannot_have_is_refused(kind: Kind, baud: int) -> None:
-    with refused(InputError, expected="baud", got=baud):
-        check_baud(kind, baud)
-
-
-def test_usual_baud_rates_are_taken() -> None:
-    for kind in KINDS:
-        for baud in (115_200, 500_000):
-            check_baud(kind, baud)

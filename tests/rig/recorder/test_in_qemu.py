@@ -22,7 +22,7 @@ from rig.wire.definition import Value
 from rig.wire.link import Link
 from rig.wire.transports import opened_transport
 from tests.rig.device.killing import BAUD
-from tests.rig.device.test_emulated import (
+from tests.rig.device.test_in_qemu import (
     BAND,
     HAS_QEMU,
     BuiltEmulator,
@@ -36,9 +36,12 @@ HELD = (200.0, 2.0, 40.0, 0.05, 60.0)  # the register Wanted
 PATIENCE_S = 30.0  # an emulated clock runs at half the computer's, or less where others work
 STM32_HZ = 168e6
 
-pytestmark = pytest.mark.skipif(
-    not HAS_QEMU, reason="qemu-system-arm and arm-none-eabi-gcc are not installed"
-)
+pytestmark = [
+    pytest.mark.long("chips that QEMU emulates in real time"),
+    pytest.mark.skipif(
+        not HAS_QEMU, reason="qemu-system-arm and arm-none-eabi-gcc are not installed"
+    ),
+]
 
 
 @pytest.fixture(scope="module", params=["m7", "stm32"])

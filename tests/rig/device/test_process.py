@@ -1,0 +1,131 @@
+"""The device's process at its pseudo-terminal: a client of its own, killed hosts, samples."""
+
+from __future__ import annotations
+
+import signal
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from modeling import InputError
+from rig.device.definition import DEVICE
+from rig.device.emulating import KINDS, Emulator, Kind, check_baud
+from rig.device.models import device_model
+from rig.device.registers import DeviceCommand, DeviceSource, DeviceState
+from rig.live.clock import now_s, readable, sleep
+from rig.wire.conversation import Conversation
+from rig.wire.transports import opened_transport
+from stimuli.planted.textures import planted_texture
+from tests.refusals import refused
+from tests.rig.device import independent_client
+from tests.rig.device.independent_client import Client
+from tests.rig.device.killing import BAUD, ticks_after_kill
+from tests.rig.device.talking import joined
+from tests.rig.device.test_models import hosts_samples
+from tests.rig.waiting import follow
+
+
+def check_bits_of_the_host(device: Emulator) -> None:
+    """In its own precision: of an STM32F405 single, against the kernel on this computer."""
+    model = planted_texture("canvas")
+    transport = opened_transport(device.address, BAUD)
+    try:
+        talk = Conversation(transport, DEVICE)
+        hello = talk.hello()
+        upload = device_model(model, hello)
+        for command in (DeviceCommand.HOME, DeviceCommand.ARM, DeviceCommand.SHOW):
+            talk.write("Command", command)
+        talk.write("EventRate", 5000 if hello.real_size == 4 else 1000)
+        talk.upload(upload.data, upload.hash)
+        talk.write("Source", DeviceSource.MODEL)
+        blocks = talk.blocks()
+
+        def beat() -> None:
+            talk.write("Heartbeat", 1)
+            talk.listen(0.02)
+            blocks.extend(talk.blocks())
+
+        follow(1.6, beat, every_s=0.0)
+        begin = talk.read("ModelTick")
+        talk.write("EventRate", 0)
+        talk.write("Source", DeviceSource.NOTHING)
+        talk.write("Command", DeviceCommand.STOP)
+        sleep(0.1)
+        talk.write("Command", DeviceCommand.CLEAR)
+    finally:
+        transport.close()
+    assert isinstance(begin, int)
+    every, values = blocks[0].every, joined(blocks)
+    host = hosts_samples(model, blocks, begin, single=hello.real_size == 4)
+    host = host[::every]
+    first = (begin - blocks[0].tick) // every
+    device_samples = values["vibration_g"][first:]
+    size = min(host.size, device_samples.size)
+    assert size > 300
+    assert np.abs(host[:size]).max() > 0.02
+    assert np.array_equal(device_samples[:size], host[:size].astype(np.float32))
+    print(f"\n{8 * hello.real_size} bits: {size} samples, all equal")
+
+
+def check_client_of_the_page(device: Emulator) -> None:
+    """A client written from the page alone talks to it."""
+    client = Client(device.address)
+    try:
+        assert client.hello()["SchemaHash"] == DEVICE.schema_hash
+        for command in (6, 1, 2):
+            client.write(10, bytes([command]))
+        assert client.read(8) == bytes([DeviceState.RUNNING])
+        client.write(16, (500).to_bytes(2, "little"))
+        records = client.records(0.3)
+        client.write(16, bytes(2))
+        client.write(10, bytes([5]))
+        numbers, ticks, *_, flags = zip(*records, strict=True)
+        assert list(numbers) == list(range(len(records)))
+        assert set(np.diff(ticks)) == {10}
+        assert all(flag & 32 for flag in flags)
+        sleep(0.1)
+        assert client.read(8) == bytes([DeviceState.FAULT])
+        client.write(10, bytes([4]))
+    finally:
+        client.close()
+
+
+def test_it_renders_the_bits_of_the_host(device: Emulator) -> None:
+    check_bits_of_the_host(device)
+
+
+def by_the_clock(reads: list[int], writes: list[int], _: list[int], seconds: float) -> Any:
+    """As select.select, of one descriptor, by the rig's clock."""
+    return (reads if reads and readable(reads[0], seconds)[0] else [], writes, [])
+
+
+def test_a_client_written_from_the_page_alone_talks_to_it(
+    device: Emulator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(independent_client, "time", SimpleNamespace(monotonic=now_s))
+    monkeypatch.setattr(independent_client, "select", SimpleNamespace(select=by_the_clock))
+    check_client_of_the_page(device)
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
+@pytest.mark.usefixtures("given_clock")
+def test_a_killed_or_stopped_host_costs_heartbeat_and_ramp(how: int) -> None:
+    """601 ticks by the device's own clock; a hundred of them: tests.rig.device.large."""
+    with Emulator("process") as emulator:
+        assert abs(ticks_after_kill(emulator.address, 3, how) - 601) <= 1
+
+
+@pytest.mark.parametrize(
+    ("kind", "baud"), [("m7", 9000), ("m7", 1_515_000), ("stm32", 6_000_000), ("stm32", 0)]
+)
+def test_a_baud_rate_that_the_board_cannot_have_is_refused(kind: Kind, baud: int) -> None:
+    with refused(InputError, expected="baud", got=baud):
+        check_baud(kind, baud)
+
+
+def test_usual_baud_rates_are_taken() -> None:
+    for kind in KINDS:
+        for baud in (115_200, 500_000):
+            check_baud(kind, baud)
