@@ -1,5 +1,6 @@
 # make demo    the whole study in silico, ends with the path of its report
-# make test    style, types, import rules and every test
+# make test    style, types, import rules, and what a change can break by mistake
+# make test-long   the long tests, other random examples, then the planted bugs; ROOM=rig/device: of one room
 # make test-core   the tests that need no extra, with every Python from 3.11 to 3.14 that is there
 # make quick ROOM=modeling/fitting   only the tests of one room
 # make bench   time the modeling and its rivals
@@ -23,7 +24,7 @@ unexport PYTHONDONTWRITEBYTECODE
 COMPILE := $(BIN)/python -W ignore -m compileall -q -j 0 -x '/tests?/'
 LOADED := numpy scipy pandas statsmodels sklearn pingouin seaborn matplotlib psychopy hypothesis _pytest
 
-.PHONY: install demo test test-core quick bench plant lint lock docs-tables wheel cross clean
+.PHONY: install demo test test-long test-core quick bench plant lint lock docs-tables wheel cross clean
 
 install: .venv/installed
 
@@ -52,14 +53,20 @@ lint: install
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# One process more than there are cores: one of them takes the tests in real time, which mostly wait.
+# Two processes more than there are cores: tests with live processes mostly wait.
 CORE_PYTHONS ?= python3.11 python3.12 python3.13 python3.14
-WORKERS := $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
+WORKERS := $(shell expr $$(getconf _NPROCESSORS_ONLN) + 2)
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n $(WORKERS) --dist worksteal
 
 test: lint
 	@sh tools/system-packages
 	$(PYTEST) $(PYTEST_FLAGS)
+
+# Other examples than those of make test each time; what fails prints how to try it again.
+test-long: install
+	@sh tools/system-packages
+	$(PYTEST) --long $(PYTEST_FLAGS) $(if $(ROOM),tests/$(ROOM) || [ $$? = 5 ])
+	$(if $(ROOM),,$(MAKE) plant)
 
 # Without psychopy, sounddevice, pyserial and plotly; what needs them is left out, and named.
 test-core:

@@ -74,12 +74,13 @@ def pytest_ignore_collect(collection_path: Path) -> bool | None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     skip_what_lacks_packages(items)
     _FILES.update(str(item.path) for item in items)
-    chosen = [item for item in items if is_chosen(item, long=config.getoption("--long"))]
-    left = [item for item in items if item not in set(chosen)]
-    if left:
-        config.hook.pytest_deselected(items=left)
+    chosen: dict[bool, list[pytest.Item]] = {True: [], False: []}
+    for item in items:
+        chosen[is_chosen(item, long=config.getoption("--long"))].append(item)
+    if chosen[False]:
+        config.hook.pytest_deselected(items=chosen[False])
     # Those with an audio server first: they wait for each other, so one worker has them all.
-    items[:] = sorted(chosen, key=uses_audio_server, reverse=True)
+    items[:] = sorted(chosen[True], key=uses_audio_server, reverse=True)
 
 
 @pytest.hookimpl(wrapper=True)

@@ -234,6 +234,7 @@ def work(tmp_path: Path) -> Path:
     return work
 
 
+@pytest.mark.long("a copy of the house that runs a study")
 def test_a_task_costs_its_file_and_columns_and_a_chapter_its_folder_and_a_line(
     house: Path, work: Path
 ) -> None:

@@ -38,7 +38,7 @@ def test_a_name_that_a_stray_server_has_is_left_to_it(
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])
-def test_a_server_ends_with_the_test_that_is_killed(how: signal.Signals) -> None:
+def test_a_server_ends_with_the_test_that_is_killed(jack_server: Jack, how: signal.Signals) -> None:
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     with subprocess.Popen(
         [sys.executable, "-c", HOLD], env=environment, stdout=subprocess.PIPE

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import re
 import subprocess
@@ -10,8 +11,11 @@ import tarfile
 import tomllib
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
+from typing import Any
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from modeling.extras import CONSOLE_BEFORE, Extra
 from modeling.rendering import compiled
@@ -46,6 +50,72 @@ def test_every_c_part_keeps_to_the_stable_interface() -> None:
     parts = [p.name for room in rooms for p in (ROOT / room).rglob("_*.*") if p.suffix != ".c"]
     assert len([name for name in parts if name.endswith(stable)]) == 10
     assert not [name for name in parts if name.endswith(own)]
+
+
+def test_the_lock_holds_every_extra() -> None:
+    """What an extra asks for, and extras of extras; in the versions that it allows."""
+    lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+    pinned = dict(re.findall(r"^([a-z0-9._-]+)==([^ \n]+)", lock, re.MULTILINE))
+    extras = PROJECT["optional-dependencies"]
+    asked = [Requirement(line) for lines in extras.values() for line in lines]
+    asked += [Requirement(line) for line in PROJECT["dependencies"]]
+    assert {one for r in asked if r.name == PROJECT["name"] for one in r.extras} <= extras.keys()
+    others = [r for r in asked if r.name != PROJECT["name"]]
+    assert len(others) > 30
+    wrong = {
+        r.name: pinned.get(canonicalize_name(r.name))
+        for r in others
+        if not r.specifier.contains(pinned.get(canonicalize_name(r.name), "0"), prereleases=True)
+    }
+    assert wrong == {}
+
+
+@pytest.fixture(scope="module")
+def parts() -> dict[str, dict[str, Any]]:
+    """Of each C part: its source's text, folders and the files that it says it depends on."""
+    spec = importlib.util.spec_from_file_location("c_parts", ROOT / "tools/c_parts.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    found = {}
+    for name in re.findall(r'^    "(\w+)",$', (ROOT / "setup.py").read_text(), re.MULTILINE):
+        _, source, _, settings = getattr(module, name)._assigned_source
+        found[name] = {"source": source, **settings}
+    assert len(found) == 9
+    return found
+
+
+def test_a_header_that_changes_rebuilds_every_part_that_includes_it(
+    parts: dict[str, dict[str, Any]], tmp_path: Path
+) -> None:
+    """By what the compiler reads; make, told that a header is new, installs again."""
+    headers: set[Path] = set()
+    for name, part in parts.items():
+        source = tmp_path / f"{name}.c"
+        source.write_text(part["source"])
+        defines = [f"-D{macro}={value or 1}" for macro, value in part["define_macros"]]
+        folders = [f"-I{folder}" for folder in part["include_dirs"]]
+        read = subprocess.run(
+            ["gcc", "-std=c99", "-MM", *defines, *folders, str(source)],
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout
+        own = {Path(word).resolve() for word in read.split() if word.endswith(".h")}
+        assert own <= {Path(depends).resolve() for depends in part["depends"]}, name
+        headers |= own
+    assert len(headers) > 25
+    make = ["make", "-n", "-o", ".venv/packages", ".venv/installed"]
+    for header in headers:
+        told = subprocess.run(
+            [*make, "-W", str(header.relative_to(ROOT))],
+            cwd=ROOT,
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout
+        assert "--editable" in told, header
 
 
 def test_the_citation_names_this_version() -> None:

@@ -173,6 +173,11 @@ def standin_binding() -> FFI:
     return builder
 
 
+def headers_in(folders: list[Path]) -> list[str]:
+    """All that a part may include."""
+    return sorted(str(header) for folder in folders for header in folder.glob("*.h"))
+
+
 def virtual_board() -> str:
     """Declarations of a simulated board in a process, whatever the device is."""
     public = r"^static (?:inline )?(\w[^;{}=]*?tq_virtual_(?:%s)\([^)]*\))(?=\s*\{)"
@@ -185,9 +190,6 @@ def virtual_board() -> str:
 def device_binding() -> FFI:
     """The builder of `rig.device._device`: the firmware on a simulated board."""
     header = DEVICE / "virtual.h"
-    inner = ("backend.h", "clock.h", "force.h", "kernel.h", "scene.h", "weigh.h")
-    others = ("cables.h", "device.h", "mechanics.h", "model.h", "observer.h", "registers.h")
-    others += ("served.h", "simulated.h", "tension.h", "wire.h")
     builder = FFI()
     numbers = "typedef double tq_number;\n#define TQ_MOTORS 2"
     mechanics = (declarations(DEVICE / f"{name}.h") for name in ("cables", "mechanics"))
@@ -197,12 +199,7 @@ def device_binding() -> FFI:
         "rig.device._device",
         f'#include "{header.name}"',
         include_dirs=[str(folder) for folder in folders],
-        depends=[
-            str(folder / name)
-            for folder in folders
-            for name in (*inner, *others, header.name)
-            if (folder / name).exists()
-        ],
+        depends=headers_in(folders),
         define_macros=[("_GNU_SOURCE", None)],
         extra_compile_args=COMPILER_ARGUMENTS,
         optional=True,
@@ -213,8 +210,7 @@ def device_binding() -> FFI:
 def recorder_binding() -> FFI:
     """The builder of `rig.recorder._recorder`: the recorder's law on simulated mechanics."""
     headers = [OBSERVER, *(RECORDER / f"{name}.h" for name in ("control", "plant"))]
-    others = [RECORDER / f"{name}.h" for name in ("registers", "recorder", "simulated", "board")]
-    others += [DEVICE / f"{name}.h" for name in ("wire", "served", "virtual")]
+    folders = [RECORDER, DEVICE, FORCE.parent, LIVE.parent]
     builder = FFI()
     builder.cdef(
         "\n".join(
@@ -231,8 +227,8 @@ def recorder_binding() -> FFI:
     builder.set_source(
         "rig.recorder._recorder",
         '#include "board.h"',
-        include_dirs=[str(RECORDER), str(DEVICE), str(FORCE.parent), str(LIVE.parent)],
-        depends=[str(header) for header in (*headers, *others, BACKEND, CLOCK)],
+        include_dirs=[str(folder) for folder in folders],
+        depends=headers_in(folders),
         define_macros=[("_GNU_SOURCE", None)],
         extra_compile_args=COMPILER_ARGUMENTS,
         optional=True,

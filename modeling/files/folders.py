@@ -102,12 +102,12 @@ def replace_folder(path: str | Path, seen: Contents | None = None) -> Iterator[P
     OSError
         With the name that a file would have had at `path`, not with its hidden one.
     """
-    named = folder_behind(path)
-    target = named.absolute()
+    given = folder_behind(path)
+    target = given.absolute()
     before = contents_of(target) if seen is None else seen
-    with unfinished_folder(target) as hidden:
+    with _as_given(given, target), unfinished_folder(target) as hidden:
         fresh = hidden / target.name
-        with _named(named, fresh):
+        with _named(target, fresh):
             fresh.mkdir()
             yield fresh
             fresh.chmod(0o755)
@@ -118,6 +118,20 @@ def replace_folder(path: str | Path, seen: Contents | None = None) -> Iterator[P
             except InputError as error:
                 raise InputError(f"{error} What was made is in {_kept(fresh, target)}.") from None
         _delete(_old(fresh), target)
+
+
+@contextmanager
+def _as_given(given: Path, target: Path) -> Iterator[None]:
+    """The system's errors name places in `target`, and above it, from where `given` begins."""
+    base = target.parents[len(given.parts) - 1] if not given.is_absolute() else None
+    try:
+        yield
+    except OSError as error:
+        if base is not None and isinstance(error.filename, str | Path):
+            place = Path(error.filename)
+            if place.is_relative_to(base) and place != base:
+                error.filename = str(place.relative_to(base))
+        raise
 
 
 @contextmanager

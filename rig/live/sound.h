@@ -26,7 +26,7 @@
 #define TQ_FRESH 64      /* readings that a block takes in at most, the latest */
 #define TQ_CLOCK_S 0.1   /* over which the times of blocks are smoothed */
 #define TQ_PAUSE_S 0.05  /* a block so much out of time begins a new sequence of them */
-#define TQ_NEXT_S 0.02   /* a given clock waits for a card that does not call for so long */
+#define TQ_NEXT 3        /* a given clock is so many blocks ahead of the card at most */
 #define TQ_UNDERFLOWED 4 /* of PortAudio: paOutputUnderflow */
 
 /* A voice with a number, by which the log knows it. */
@@ -66,6 +66,7 @@ struct tq_sound {
     uint64_t masking_key, position, signal_samples;
     tq_weighting weighting;
     void (*follows)(double); /* NULL but where the clock is given: is told when the next call is due */
+    double heard_s;          /* how far the card has come, by that clock */
 };
 typedef struct tq_sound tq_sound;
 
@@ -349,8 +350,13 @@ static int tq_sound_callback(const void *in, void *out, unsigned long frames, co
     double latency_s = moments ? moments[2] - moments[1] : 0;
     tq_block block = tq_sound_block(s, tq_now(), (float *)out, frames);
     (void)in;
-    if (s->follows)
-        s->follows(block.time_s + TQ_NEXT_S + 2 * (double)frames / s->rate_hz);
+    if (s->follows) {
+        double block_s = (double)frames / s->rate_hz;
+        s->heard_s += block_s;
+        if (s->heard_s > block.time_s || s->heard_s == block_s) /* a card may be ahead of the clock */
+            s->heard_s = block.time_s;
+        s->follows(s->heard_s + TQ_NEXT * block_s);
+    }
     block.dac_time_s = block.time_s + (latency_s > 0 && latency_s < 10 ? latency_s : 0);
     if (flags & TQ_UNDERFLOWED)
         block.flags |= TQ_UNDERFLOW;

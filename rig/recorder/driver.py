@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Protocol
 
 from modeling.errors import InputError
 from rig.device.virtual import TICK_HZ, VirtualBoard, VirtualTransport
+from rig.live.clock import sleep
 from rig.recorder.definition import RECORDER
 from rig.recorder.law import RecorderLaw, WantedRecord
 from rig.recorder.registers import (
@@ -93,7 +93,7 @@ class LinkedWire:
     def pause(self, seconds: float) -> None:
         """See `RecorderWire`."""
         self._link.beat()
-        time.sleep(seconds)
+        sleep(seconds)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -67,6 +67,7 @@ def test_bench_chart_of_recordings_writes_tables_pictures_and_a_page(
     assert {path.name for path in out.iterdir()} == CONTENTS
 
 
+@pytest.mark.long("Dask with real workers")
 def test_dask_workers_do_the_same(main, oak: Path, tmp_path: Path, scheduler: str) -> None:
     folders = ("--recordings", oak, "--recordings", oak.with_name("elm"))
     for name, where in (("here", ("--jobs", 1)), ("there", ("--dask", scheduler))):

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import pandas as pd
+import pytest
 
 from experiments import Study
 from modeling import RecordingSet, TextureModel
@@ -17,6 +18,7 @@ from stimuli.planted.textures import TEXTURES
 RATINGS = ["magnitude_similarity", "frequency_similarity"]
 
 
+@pytest.mark.long("the full demo")
 def test_demo_from_recording_to_report(run, tmp_path: Path) -> None:
     result = run("demo")
     assert result.returncode == 0, result.stderr

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from rig.live.compiled import CLOCK
 from rig.setup.rig_file import SHIPPED_RIG_FILE
 from stimuli.planted.textures import planted_texture
 
@@ -32,6 +33,7 @@ def test_a_rig_is_felt_until_escape(models: Path, display: str, jack_server: Jac
     command = [sys.executable, "-m", "tactileq", "feel", "canvas.json", "--rig", "rig.toml"]
     with jack_server(block=128) as server:
         environment = {**server.environment, "DISPLAY": display}
+        del environment[CLOCK]  # its card is no simulated one
         program = subprocess.Popen(command, cwd=models, env=environment, stderr=subprocess.PIPE)
         try:
             server.wait_for_port(":out_", seconds=60)

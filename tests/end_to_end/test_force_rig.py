@@ -68,6 +68,7 @@ def test_the_check_says_what_no_hardware_has_confirmed(
     assert "expected a force device, got none" in " ".join(done.stdout.split())
 
 
+@pytest.mark.long("a whole measurement in real time")
 def test_the_stiffness_of_the_real_surface_is_found_and_the_wall_made_as_stiff(
     main: Any, tmp_path: Path, force_device: StandIn, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,7 +1,7 @@
 """Signals at any moment: nothing lost, nothing left, nobody writing on.
 
-In the suite two quick commands meet two moments; `TACTILEQ_MOMENTS=10` gives every long command ten
-moments of SIGTERM and ten of SIGKILL, in half an hour.
+In `make test` two quick commands meet two moments, in `make test-long` every command three moments
+of SIGTERM and three of SIGKILL; `TACTILEQ_MOMENTS=10` gives it ten, in half an hour.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from modeling.perception.thresholds import Threshold
 from modeling.perception.verdicts import ENDING
 from stimuli.planted.textures import planted_texture, record_texture
 
-MOMENTS = int(os.environ.get("TACTILEQ_MOMENTS", "0"))
+MOMENTS = int(os.environ.get("TACTILEQ_MOMENTS", "3"))
 SPEEDS = ("--speed", "100", "--speed", "300", "--force", "1", "--force", "3")
 
 
@@ -175,17 +175,28 @@ def assert_kept(name: str, found: dict[str, bytes], *, old: Files, new: Files) -
         assert files in (olds[group], news[group]), group
 
 
+TWO_MOMENTS = [(signal.SIGTERM, 0.8), (signal.SIGKILL, 0.9)]
+
+
 def moments(count: int) -> list[tuple[int, float]]:
     """Signals and the shares of the command's time after which they come."""
-    if not count:
-        return [(signal.SIGTERM, 0.8), (signal.SIGKILL, 0.9)]
     shares = [0.2 + 0.8 * (n + 0.5) / count for n in range(count)]
     return [(number, share) for number in (signal.SIGTERM, signal.SIGKILL) for share in shares]
 
 
-@pytest.mark.timeout(7200 if MOMENTS else 300)
-@pytest.mark.parametrize("name", LONG if MOMENTS else QUICK)
+@pytest.mark.parametrize("name", QUICK)
 def test_interrupted_commands_lose_nothing_and_leave_nothing(place: Path, name: str) -> None:
+    check_interrupted(place, name, TWO_MOMENTS)
+
+
+@pytest.mark.long("interruptions at many moments")
+@pytest.mark.timeout(7200)
+@pytest.mark.parametrize("name", LONG)
+def test_interrupted_at_many_moments(place: Path, name: str) -> None:
+    check_interrupted(place, name, moments(MOMENTS))
+
+
+def check_interrupted(place: Path, name: str, times: list[tuple[int, float]]) -> None:
     out, kept = place / "out", place / "kept"
     kept.mkdir()
     if name == "analyze":
@@ -204,7 +215,7 @@ def test_interrupted_commands_lose_nothing_and_leave_nothing(place: Path, name: 
     old, new = contents(kept), contents(out)
     assert new != old
     restore()
-    for number, share in moments(MOMENTS):
+    for number, share in times:
         words = words_of(name, 2)
         code, told = interrupt(words, place, number=number, after_s=share * takes_s)
         assert code in (0, -number, 128 + number), told

@@ -1,6 +1,6 @@
 """Damage in what one participant's session stored costs that session, by name, and nothing else.
 
-More mutations than in the suite, with their tally: TACTILEQ_MUTATIONS=1500 pytest -s THIS_FILE
+More mutations than in `make test-long`: TACTILEQ_MUTATIONS=1500 pytest --long -s THIS_FILE
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from tests.experiments.sessions.enrolling import enrolled
 from tests.experiments.verification.small_studies import run_one, small_models, small_study
 from tests.mutating import mutated
 
-MUTATIONS = int(os.environ.get("TACTILEQ_MUTATIONS", "10"))
+FEW = 10
+MANY = int(os.environ.get("TACTILEQ_MUTATIONS", "300"))
 DAMAGED = "sub-01"
 SOURCE = f"sourcedata/{DAMAGED}/ses-01/{DAMAGED}_ses-01_task-absolute_"
 ANSWERS = "sub-02/ses-01/beh/sub-02_ses-01_task-absolute_beh.tsv"
@@ -139,14 +140,28 @@ class Trial:
             self.wrong.append(f"number {person.subject} and slot {person.slot} twice")
 
 
-@pytest.mark.timeout(max(600, 2 * MUTATIONS))
 def test_damage_costs_what_is_damaged_and_nothing_else(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    check_damaged(study, tmp_path, capsys, FEW)
+
+
+@pytest.mark.long("mutations by the hundred")
+@pytest.mark.timeout(max(600, 2 * MANY))
+def test_damage_of_many_kinds(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    check_damaged(study, tmp_path, capsys, MANY)
+
+
+def check_damaged(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], count: int
+) -> None:
+    """So many mutations of each kind in turn."""
     tally: Counter[tuple[str, str]] = Counter()
     wrong = []
     folder = tmp_path / "data"
-    for seed in range(MUTATIONS):
+    for seed in range(count):
         kind = list(KINDS)[seed % len(KINDS)]
         shutil.copytree(study, folder)
         spoil(folder / KINDS[kind], seed)
@@ -155,8 +170,8 @@ def test_damage_costs_what_is_damaged_and_nothing_else(
         wrong += [f"seed {seed} ({kind}): {told[:300]}" for told in trial.wrong]
         shutil.rmtree(folder)
     with capsys.disabled():
-        if MUTATIONS > 100:
+        if count > FEW:
             for (kind, outcome), count in sorted(tally.items()):
                 print(f"{kind}: {outcome}: {count}")
-            print(f"{len(wrong)} wrong of {MUTATIONS}")
+            print(f"{len(wrong)} wrong of {count}")
     assert wrong == []

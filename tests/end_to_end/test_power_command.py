@@ -73,6 +73,7 @@ def test_power_counts_by_the_rule_of_the_plan(
     assert not (place / "no").exists()
 
 
+@pytest.mark.long("Dask with real workers")
 def test_dask_workers_give_the_same_table(main, place: Path) -> None:
     from distributed import LocalCluster  # late: collecting the tests needs no Dask
 

@@ -96,6 +96,7 @@ def test_monitor_ends_by_itself_with_a_line(
     assert re.search(r"takes [\d.]+% of a block \(median\), [\d.]+% in 99.9 % of blocks$", line)
 
 
+@pytest.mark.long("a whole measurement in real time")
 def test_the_level_at_the_pen_is_measured(rig: Path) -> None:
     before = rig.read_text()
     done = prompted(rig.parent, "calibrate", "level", "--placements", "3")
@@ -106,6 +107,7 @@ def test_the_level_at_the_pen_is_measured(rig: Path) -> None:
         assert loaded.calibration is not None
 
 
+@pytest.mark.long("a whole measurement in real time")
 def test_latency_is_measured_from_hand_to_vibration(rig: Path) -> None:
     before = rig.read_text()
     done = prompted(rig.parent, "latency", "--trials", "50", "--accept", "a server without a card")

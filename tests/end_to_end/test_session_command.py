@@ -100,6 +100,7 @@ def test_a_session_that_is_ended_by_a_signal_goes_on_and_ends_with_its_terminal(
     assert len(table.read_text().splitlines()) == 1  # nobody has answered
 
 
+@pytest.mark.long("the times of this machine")
 def test_the_self_test_times_screen_rig_and_disk_against_limits(
     begin: Any, study: Path, display: str
 ) -> None:

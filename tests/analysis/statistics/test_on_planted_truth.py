@@ -17,6 +17,8 @@ from analysis.statistics.claims import Values, claim_tests, complete_means
 from analysis.statistics.paired import holm, paired_test
 from analysis.statistics.rates import correct_rates
 
+pytestmark = pytest.mark.long("simulations by the hundred")
+
 
 def binomial_limits(probability: float, repeats: int) -> tuple[float, float]:
     """Shares between which a right procedure falls in 99.9 % of such tests."""

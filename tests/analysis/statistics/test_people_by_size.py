@@ -66,6 +66,7 @@ def close(one: PeopleJudged, other: PeopleJudged) -> None:
     assert one.textures["mean"].to_numpy() == pytest.approx(means, abs=0.25 * width)
 
 
+@pytest.mark.long("simulations of large studies")
 @pytest.mark.parametrize(
     ("studies", "bounds", "model"),
     [

@@ -75,6 +75,7 @@ def test_normal_differences_hold_what_is_promised(procedure: str, quantity: str)
     assert within_limits(row, row["nominal"])
 
 
+@pytest.mark.long("simulations by the hundred")
 def test_models_of_single_answers_hold_what_they_promise_for_eight_people():
     """100 simulations each: they take a tenth of a second."""
     for procedure, situation in (

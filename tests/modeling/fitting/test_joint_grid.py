@@ -175,6 +175,7 @@ def share(scores: list[Names], part: str, whole: str) -> float:
     return sum(getattr(s, part) for s in scores) / max(1, sum(getattr(s, whole) for s in scores))
 
 
+@pytest.mark.long("a sweep of random grids")
 def test_names_are_kept(judged: Mapping[tuple[str, bool], list[Names]]) -> None:
     joint = judged["joint", False] + judged["joint", True]
     assert share(joint, "kept", "found") >= 0.98
@@ -182,6 +183,7 @@ def test_names_are_kept(judged: Mapping[tuple[str, bool], list[Names]]) -> None:
     assert share(joint, "planted_found", "planted") >= 0.8
 
 
+@pytest.mark.long("a sweep of random grids")
 @pytest.mark.parametrize("independent", [False, True])
 def test_naming_the_grid_as_a_whole_beats_tracking_step_by_step(
     judged: Mapping[tuple[str, bool], list[Names]], independent: bool

@@ -142,6 +142,7 @@ def test_blends_hold_where_they_once_collapsed() -> None:
     assert 0 < model.fit.blend_defect_db <= LARGEST_DEFECT_DB
 
 
+@pytest.mark.long("a sweep of surfaces")
 def test_the_expected_distance_is_that_from_the_truth() -> None:
     """On average over surfaces, and longer records bring a model nearer."""
     ratios, lengths = [], []

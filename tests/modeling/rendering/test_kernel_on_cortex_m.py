@@ -33,10 +33,13 @@ from stimuli.planted.textures import planted_texture
 HERE = Path(__file__).parent
 DOCS = HERE.parents[2] / "docs"
 NEEDED = ("arm-none-eabi-gcc", "qemu-system-arm", "prlimit")
-pytestmark = pytest.mark.skipif(
-    not all(map(shutil.which, NEEDED)),
-    reason=f"not all of {', '.join(NEEDED)} are installed (see tools/system-packages)",
-)
+pytestmark = [
+    pytest.mark.long("chips that QEMU emulates"),
+    pytest.mark.skipif(
+        not all(map(shutil.which, NEEDED)),
+        reason=f"not all of {', '.join(NEEDED)} are installed (see tools/system-packages)",
+    ),
+]
 
 CANVAS = planted_texture("canvas")
 MDF = planted_texture("MDF")

@@ -63,6 +63,7 @@ def undefined(path: Path) -> set[str]:
 
 
 @needs_arm
+@pytest.mark.long("cross builds")
 @pytest.mark.parametrize("target", TARGETS)
 def test_on_a_micro_controller_nothing_is_called_but_copies(tmp_path: Path, target: str) -> None:
     """With -fno-math-errno a square root is one instruction, in the precision of the texture."""
@@ -75,6 +76,7 @@ def test_on_a_micro_controller_nothing_is_called_but_copies(tmp_path: Path, targ
 
 
 @needs_arm
+@pytest.mark.long("cross builds")
 def test_without_that_option_the_root_in_single_precision_is_called(tmp_path: Path) -> None:
     """For errno's sake. A root in double precision would cost an M4F hundreds of instructions."""
     assert undefined(object_for(tmp_path, "M4F float", "-O1")) <= CALLED | {"sqrtf"}
@@ -90,6 +92,7 @@ def lanes(command: list[str], *options: str) -> int:
 
 
 @needs_arm
+@pytest.mark.long("cross builds")
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_micro_controller_takes_one_layer_at_a_time(target: str) -> None:
     assert lanes(["arm-none-eabi-gcc", *TARGETS[target]]) == 1

@@ -11,6 +11,8 @@ import pytest
 
 import modeling.rendering
 
+pytestmark = pytest.mark.long("sweeps of signals: a million steps")
+
 HERE = Path(__file__).parent
 KERNEL_FOLDER = Path(modeling.rendering.__file__).parent
 SAMPLES = 10_000_000

@@ -14,7 +14,7 @@ from rig.device.definition import DEVICE
 from rig.device.emulating import KINDS, Emulator, Kind, check_baud
 from rig.device.models import device_model
 from rig.device.registers import DeviceCommand, DeviceSource, DeviceState
-from rig.live.clock import now_s, readable, sleep
+from rig.live.clock import now_s, readable, sleep, taking_part
 from rig.wire.conversation import Conversation
 from rig.wire.transports import opened_transport
 from stimuli.planted.textures import planted_texture
@@ -106,7 +106,8 @@ def test_a_client_written_from_the_page_alone_talks_to_it(
 ) -> None:
     monkeypatch.setattr(independent_client, "time", SimpleNamespace(monotonic=now_s))
     monkeypatch.setattr(independent_client, "select", SimpleNamespace(select=by_the_clock))
-    check_client_of_the_page(device)
+    with taking_part():
+        check_client_of_the_page(device)
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])

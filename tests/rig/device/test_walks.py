@@ -37,6 +37,7 @@ def told(program: Path, *arguments: object) -> dict[str, float]:
     return {name: float(number) for name, number in found}
 
 
+@pytest.mark.long("sweeps: all sequences of inputs, ten million ticks")
 def test_no_path_arms_without_a_command(walks: Path) -> None:
     """All sequences of four of twelve inputs: commands, a host that says hello, falls silent or
     whose loop hangs, an encoder that jumps, a restart."""
@@ -46,6 +47,7 @@ def test_no_path_arms_without_a_command(walks: Path) -> None:
     assert found["wrong"] == 0
 
 
+@pytest.mark.long("sweeps: all sequences of inputs, ten million ticks")
 def test_no_limit_is_broken_in_ten_million_ticks(walks: Path) -> None:
     found = told(walks, "limits", 6, 10_000_000)
     assert found["running"] > 1e6

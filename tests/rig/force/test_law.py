@@ -83,6 +83,7 @@ def test_nothing_reaches_running_but_arm_and_then_show() -> None:
     assert ways > 0
 
 
+@pytest.mark.long("sweeps: ten million steps")
 def test_a_random_walk_of_ten_million_faulty_steps_breaks_no_limit(program: Path) -> None:
     found = walks(program, "faults", 1, 10_000_000)
     assert found["broken"] == 0

@@ -97,6 +97,7 @@ def linked(cable: Cable) -> Iterator[Link]:
         return opened_transport(str(cable.path), BAUD)
 
     with Link(opening, DEVICE) as link:
+        until(lambda: link.read("State") != DeviceState.BOOT, what="it does not begin")
         yield link
 
 

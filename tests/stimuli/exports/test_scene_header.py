@@ -602,6 +602,7 @@ def test_arrays_that_are_equal_are_held_once(case: str) -> None:
     assert sum(map(len, arrays)) * size == pooled_bytes(rendered)
 
 
+@pytest.mark.long("cross builds")
 @pytest.mark.skipif(
     shutil.which("arm-none-eabi-gcc") is None,
     reason="arm-none-eabi-gcc is not installed (see tools/system-packages)",
