@@ -32,8 +32,8 @@ from tests.selection import holds_tests, is_chosen, uses_audio_server
 
 # `make test` tries the same examples everywhere; `make test-long` others each time. A slow machine
 # is no counterexample: no test fails for its wall time.
-settings.register_profile("fixed", deadline=None, database=None, derandomize=True)
-settings.register_profile("random", deadline=None, database=None, print_blob=True)
+settings.register_profile("fixed", deadline=None, database=None, derandomize=True, max_examples=60)
+settings.register_profile("random", deadline=None, database=None, print_blob=True, max_examples=300)
 
 # The libraries, loaded once, are a million objects. By default they are looked through for garbage
 # again and again, which takes more than a twentieth of the time of all tests.
