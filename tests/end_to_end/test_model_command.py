@@ -51,6 +51,7 @@ def three(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.long("whole textures, twice")
 def test_one_job_and_several_write_the_same_bytes(main, run, three: Path) -> None:
     one = main("model", three, "--out", "by-1")  # adds --jobs 1
     two = run("model", three / "canvas", three / "others", "--jobs", 2, "--out", "by-2")

@@ -98,6 +98,7 @@ def test_the_shipped_file_is_the_default_law() -> None:
     assert RecorderFile.load(SHIPPED_RECORDER_FILE).law() == RecorderLaw()
 
 
+@pytest.mark.long("a recorder that is killed, in real time; in virtual time: test_recording")
 @pytest.mark.timeout(120)
 @pytest.mark.usefixtures("given_clock")
 def test_a_killed_computer_goes_on_with_what_is_missing(main: Any, tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from benches.chart.timing import stream_of, time_table
 from benches.rendering.timer import Turn
 
 
+@pytest.mark.long("the times of this machine")
 def test_rendering_is_timed_in_turn_and_what_cannot_be_is_not(chart: Chart) -> None:
     times = chart.summary.groupby(["method", "precision"])["ns"].count()
     assert times["joint, 1 layer", "single"] > 0
