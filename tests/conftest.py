@@ -6,6 +6,7 @@ import fcntl
 import gc
 import os
 import pickle
+import re
 import resource
 import shutil
 import signal
@@ -177,7 +178,22 @@ def given_clock() -> Iterator[None]:
     """A clock that stands still while any process of a rig is late (docs/method/live.md#clock)."""
     with GivenClock() as clock:
         yield
-        assert clock.hung == 0, "expected all who take part in the clock to go on"
+        assert clock.hung == "", f"expected all who take part in the clock to go on: {_told(clock)}"
+
+
+def _told(clock: GivenClock) -> str:
+    """What the process that hangs is, and where its thread waits."""
+    thread, process = re.findall(r"\d+", clock.hung)
+    told = []
+    for name in (
+        "cmdline",
+        f"task/{thread}/stat",
+        f"task/{thread}/wchan",
+        f"task/{thread}/syscall",
+    ):
+        with suppress(OSError):
+            told.append(Path(f"/proc/{process}/{name}").read_text().replace("\0", " ")[:300])
+    return "; ".join([f"this is {os.getpid()}", *told])
 
 
 @pytest.fixture

@@ -179,7 +179,7 @@ typedef struct tq_place tq_place;
 struct tq_clock {
     uint64_t now;     /* by tq_put_time */
     uint64_t ahead;   /* of the computer's clock, once it is ended */
-    uint64_t ended, hung;
+    uint64_t ended, hung; /* hung: who was waited for in vain */
     tq_place place[TQ_PLACES];
 };
 typedef struct tq_clock tq_clock;
@@ -390,7 +390,8 @@ TQ_INNER double tq_earliest(tq_clock *clock, double *absent, double now_s, doubl
             int hangs = comes && late_s > TQ_HANGS_S;
             if (!comes || hangs || called) {
                 absent[n] = until_s;
-                __atomic_add_fetch(&clock->hung, (uint64_t)hangs, __ATOMIC_RELEASE);
+                if (hangs)
+                    __atomic_store_n(&clock->hung, who, __ATOMIC_RELEASE);
                 if (state == 'X' || state == 'Z')
                     __atomic_store_n(&place->who, 0, __ATOMIC_RELEASE);
                 continue;
@@ -457,7 +458,7 @@ static inline void tq_clock_start(void *clock)
     tq_put_time(&((tq_clock *)clock)->now, tq_computer_now());
 }
 
-/* How often somebody was waited for in vain. */
+/* The last that was waited for in vain, process << 32 | thread; 0 for nobody. */
 static inline uint64_t tq_clock_hung(const void *clock)
 {
     return __atomic_load_n(&((const tq_clock *)clock)->hung, __ATOMIC_ACQUIRE);

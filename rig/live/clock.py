@@ -134,9 +134,10 @@ class GivenClock:
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     @property
-    def hung(self) -> int:
-        """How many threads were given up, each after 10 s in which all waited for it."""
-        return int(self._library.tq_clock_hung(self._address))
+    def hung(self) -> str:
+        """Who was given up last, after 10 s in which all waited for it; empty for nobody."""
+        process, thread = divmod(int(self._library.tq_clock_hung(self._address)), 2**32)
+        return f"thread {thread} of process {process}" if process else ""
 
     def _run(self) -> None:
         self._library.tq_clock_run(self._address)

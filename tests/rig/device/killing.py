@@ -20,6 +20,8 @@ from rig.live.clock import now_s, sleep, taking_part
 from rig.wire.link import Link
 from rig.wire.transports import opened_transport
 with Link(lambda: opened_transport(sys.argv[1], 1_000_000), DEVICE) as link:
+    while link.read("State") == 0:
+        sleep(0.01)
     if link.read("State") == 5:
         link.write("Command", 4)
         sleep(0.05)

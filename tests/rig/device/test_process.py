@@ -35,6 +35,8 @@ def check_bits_of_the_host(device: Emulator) -> None:
         talk = Conversation(transport, DEVICE)
         hello = talk.hello()
         upload = device_model(model, hello)
+        while talk.read("State") == DeviceState.BOOT:
+            sleep(0.01)
         for command in (DeviceCommand.HOME, DeviceCommand.ARM, DeviceCommand.SHOW):
             talk.write("Command", command)
         talk.write("EventRate", 5000 if hello.real_size == 4 else 1000)
@@ -74,6 +76,8 @@ def check_client_of_the_page(device: Emulator) -> None:
     client = Client(device.address)
     try:
         assert client.hello()["SchemaHash"] == DEVICE.schema_hash
+        while client.read(8) == bytes([DeviceState.BOOT]):
+            sleep(0.01)
         for command in (6, 1, 2):
             client.write(10, bytes([command]))
         assert client.read(8) == bytes([DeviceState.RUNNING])
