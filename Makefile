@@ -3,7 +3,7 @@
 # make test-long   the long tests, other random examples, then the planted bugs; ROOM=rig/device: of one room
 # make test-core   the tests that need no extra, with every Python from 3.11 to 3.14 that is there
 # make quick ROOM=modeling/fitting   only the tests of one room
-# make bench   time the modeling and its rivals
+# make bench   time the modeling and its rivals, and how late this machine is
 # make plant   plant 40 bugs, one at a time, and see which ones the tests catch
 # make install set up .venv/ from requirements.lock (demo and test begin with it)
 # make docs-tables   renew the tables of keys in docs/ and the JSON Schemas
@@ -83,6 +83,7 @@ quick: install
 
 bench: install
 	$(BIN)/pytest tests/benchmarks --benchmark-enable --benchmark-columns=min,median,iqr,rounds
+	$(BIN)/pytest --long tests/benchmarks/test_bench_live.py --benchmark-enable --benchmark-columns=min,median,max,rounds
 
 # All of them, or BUG=name, or ROOM=name.
 plant: install

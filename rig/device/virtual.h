@@ -127,10 +127,7 @@ static inline int tq_virtual_flush(tq_virtual *v, int port)
     return 0;
 }
 
-/* 5000 ticks a second, and bytes from `port`, which does not block (-1 for none), until `end` or `other` can
-   be read or is closed: 0 or 1; -1 where the port is gone. A board's clock never stops; where this process
-   was held up for over 20 ms, its does. */
-static int tq_virtual_run(tq_virtual *v, int port, int end, int other)
+TQ_INNER int tq_virtual_loop(tq_virtual *v, int port, int end, int other)
 {
     double due_s = tq_now(), now_s;
     struct pollfd on[3];
@@ -138,8 +135,6 @@ static int tq_virtual_run(tq_virtual *v, int port, int end, int other)
     memset(on, 0, sizeof on);
     on[0].fd = port, on[1].fd = end, on[2].fd = other;
     on[1].events = on[2].events = POLLIN;
-    tq_clock_take(getenv("TACTILEQ_CLOCK"));
-    tq_take_part(1);
     for (;;) {
         ssize_t count = 0;
         now_s = tq_now();
@@ -162,6 +157,19 @@ static int tq_virtual_run(tq_virtual *v, int port, int end, int other)
         if (port >= 0 && ((count == 0 && on[0].revents & POLLIN) || tq_virtual_flush(v, port)))
             return -1;
     }
+}
+
+/* 5000 ticks a second, and bytes from `port`, which does not block (-1 for none), until `end` or `other` can
+   be read or is closed: 0 or 1; -1 where the port is gone. A board's clock never stops; where this process
+   was held up for over 20 ms, its does. */
+static int tq_virtual_run(tq_virtual *v, int port, int end, int other)
+{
+    int ended;
+    tq_clock_take(getenv("TACTILEQ_CLOCK"));
+    tq_take_part(1);
+    ended = tq_virtual_loop(v, port, end, other);
+    tq_take_part(0);
+    return ended;
 }
 #endif
 
