@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
@@ -176,9 +177,20 @@ def _file_size_limit(bytes_: int) -> Iterator[None]:
 @pytest.fixture
 def given_clock() -> Iterator[None]:
     """A clock that stands still while any process of a rig is late (docs/method/live.md#clock)."""
+    told, done = list[str](), threading.Event()
+
+    def look() -> None:
+        while not done.wait(0.5):
+            if clock.hung and not told:
+                told.append(_told(clock))
+
     with GivenClock() as clock:
+        looker = threading.Thread(target=look, daemon=True)
+        looker.start()
         yield
-        assert clock.hung == "", f"expected all who take part in the clock to go on: {_told(clock)}"
+        done.set()
+        looker.join()
+        assert clock.hung == "", f"expected all who take part in the clock to go on: {told}"
 
 
 def _told(clock: GivenClock) -> str:
@@ -193,7 +205,7 @@ def _told(clock: GivenClock) -> str:
     ):
         with suppress(OSError):
             told.append(Path(f"/proc/{process}/{name}").read_text().replace("\0", " ")[:300])
-    return "; ".join([f"this is {os.getpid()}", *told])
+    return "; ".join(told)
 
 
 @pytest.fixture

@@ -129,7 +129,7 @@ static inline int tq_virtual_flush(tq_virtual *v, int port)
 
 TQ_INNER int tq_virtual_loop(tq_virtual *v, int port, int end, int other)
 {
-    double due_s = tq_now(), now_s;
+    double due_s = tq_now(), now_s, next_s;
     struct pollfd on[3];
     uint8_t bytes[512];
     memset(on, 0, sizeof on);
@@ -148,7 +148,10 @@ TQ_INNER int tq_virtual_loop(tq_virtual *v, int port, int end, int other)
             return -1;
         /* Longer where nothing is to be done: the ticks are made up for at once. */
         on[0].events = (short)(POLLIN | (v->waiting ? POLLOUT : 0));
-        if (tq_poll_until(on, 3, due_s + (tq_device_pace(&v->device) - 1.0) / TQ_TICK_HZ) < 0 && errno != EINTR)
+        next_s = due_s + (tq_device_pace(&v->device) - 1.0) / TQ_TICK_HZ;
+        if (tq_clock_given() && next_s < now_s + 1e-3) /* five ticks at once */
+            next_s = now_s + 1e-3;
+        if (tq_poll_until(on, 3, next_s) < 0 && errno != EINTR)
             return -1;
         if (on[1].revents || on[2].revents)
             return on[1].revents ? 0 : 1;

@@ -6,6 +6,8 @@ import os
 import signal
 import sys
 
+from rig.live.clock import is_given
+
 SERVO_PRIORITY = 20
 WATCHDOG_PRIORITY = 30
 
@@ -21,8 +23,12 @@ def outlive_signals() -> None:
 
 
 def real_time(priority: int) -> bool:
-    """Give this thread a real-time priority (FIFO, 1 … 99); whether it may have it."""
-    if sys.platform != "linux":
+    """Give this thread a real-time priority (FIFO, 1 … 99); whether it may have it.
+
+    A given clock waits for all: there it would only keep others from the processor, such as the
+    kernel's own thread that passes on what a pseudo-terminal gets.
+    """
+    if sys.platform != "linux" or is_given():
         return False
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))

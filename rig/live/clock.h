@@ -155,6 +155,7 @@ static inline uint64_t tq_clock_hung(const void *clock)
 #include <fcntl.h>
 #include <linux/futex.h>
 #include <poll.h>
+#include <signal.h>
 #include <stdio.h>
 #include <sys/mman.h>
 #include <sys/syscall.h>
@@ -163,7 +164,7 @@ static inline uint64_t tq_clock_hung(const void *clock)
 #define TQ_PLACES 64
 #define TQ_SLICE_S 1e-3   /* who waits for another process looks as often at least */
 #define TQ_LEAST_S 1e-5   /* each wait: who asks again and again whether it is time lets it pass */
-#define TQ_HANGS_S 10.0   /* who is late for so long, by the computer's clock, is waited for no longer */
+#define TQ_HANGS_S 60.0   /* who is late for so long, by the computer's clock, is waited for no longer */
 #define TQ_BEHIND_S 0.01  /* a computer that is late for no longer costs no time */
 #define TQ_CALLED_S 3.0   /* who is called by others, for so long: a sound server may have died */
 #define TQ_UNKNOWN_S 0.02 /* who is late for so long may have ended, or be suspended on purpose */
@@ -180,6 +181,7 @@ struct tq_clock {
     uint64_t now;     /* by tq_put_time */
     uint64_t ahead;   /* of the computer's clock, once it is ended */
     uint64_t ended, hung; /* hung: who was waited for in vain */
+    uint64_t giver;       /* the process that lets it go on */
     tq_place place[TQ_PLACES];
 };
 typedef struct tq_clock tq_clock;
@@ -206,6 +208,14 @@ static inline int tq_clock_take(const char *path)
 static inline int tq_clock_given(void)
 {
     return tq_the_clock != NULL;
+}
+
+/* Ends it: all that follow it go on with the computer's clock, from the same moment. */
+static inline void tq_clock_end(void *clock)
+{
+    tq_clock *c = (tq_clock *)clock;
+    tq_put_time(&c->ahead, tq_take_time(&c->now) - tq_computer_now());
+    __atomic_store_n(&c->ended, 1, __ATOMIC_RELEASE);
 }
 
 static inline double tq_now(void)
@@ -293,6 +303,8 @@ static inline void tq_sleep_until(double time_s)
     }
     time_s = tq_expect(time_s);
     while (tq_now() < time_s) {
+        if (kill((pid_t)tq_the_clock->giver, 0) && errno == ESRCH && !tq_the_clock->ended)
+            tq_clock_end(tq_the_clock); /* it was killed */
         if (tq_own_place && !__atomic_load_n(&tq_the_clock->ended, __ATOMIC_ACQUIRE)) {
             uint32_t woken = __atomic_load_n(&tq_own_place->woken, __ATOMIC_ACQUIRE);
             if (tq_now() < time_s)
@@ -315,14 +327,13 @@ TQ_INNER int tq_poll_until(struct pollfd *on, nfds_t count, double time_s)
         wait.tv_sec = (time_t)left_s, wait.tv_nsec = (long)(1e9 * (left_s - (double)wait.tv_sec));
         return (int)syscall(SYS_ppoll, on, count, &wait, NULL, 0);
     }
-    if (left_s > TQ_SLICE_S)
-        time_s -= left_s - TQ_SLICE_S;
-    time_s = tq_expect(time_s);
-    do {
-        wait.tv_nsec = 200000; /* the kernel leaves the rest in it */
-        found = (int)syscall(SYS_ppoll, on, count, &wait, NULL, 0);
-    } while (found == 0 && tq_now() < time_s);
-    return found;
+    /* Once before and once after: each look at a pseudo-terminal waits for a thread of the kernel. */
+    found = (int)syscall(SYS_ppoll, on, count, &wait, NULL, 0);
+    if (found)
+        return found;
+    tq_sleep_until(left_s > TQ_SLICE_S ? time_s - left_s + TQ_SLICE_S : time_s);
+    wait.tv_nsec = 0;
+    return (int)syscall(SYS_ppoll, on, count, &wait, NULL, 0);
 }
 
 /* Waits for one of two descriptors (-1: none) to be readable until a moment: 1 and 2, both, or 0. */
@@ -444,17 +455,10 @@ static void tq_clock_run(void *clock)
     }
 }
 
-/* Ends it: all that follow it go on with the computer's clock, from the same moment. */
-static inline void tq_clock_end(void *clock)
-{
-    tq_clock *c = (tq_clock *)clock;
-    tq_put_time(&c->ahead, tq_take_time(&c->now) - tq_computer_now());
-    __atomic_store_n(&c->ended, 1, __ATOMIC_RELEASE);
-}
-
 /* Begins one in memory of zeros. */
 static inline void tq_clock_start(void *clock)
 {
+    ((tq_clock *)clock)->giver = (uint64_t)getpid();
     tq_put_time(&((tq_clock *)clock)->now, tq_computer_now());
 }
 

@@ -135,7 +135,7 @@ class GivenClock:
 
     @property
     def hung(self) -> str:
-        """Who was given up last, after 10 s in which all waited for it; empty for nobody."""
+        """Who was given up last, after a minute in which all waited for it; empty for nobody."""
         process, thread = divmod(int(self._library.tq_clock_hung(self._address)), 2**32)
         return f"thread {thread} of process {process}" if process else ""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any
 
@@ -94,6 +95,12 @@ def check_client_of_the_page(device: Emulator) -> None:
         client.write(10, bytes([4]))
     finally:
         client.close()
+
+
+@pytest.fixture
+def device(given_clock: None) -> Iterator[Emulator]:
+    with Emulator("process") as emulator:
+        yield emulator
 
 
 def test_it_renders_the_bits_of_the_host(device: Emulator) -> None:

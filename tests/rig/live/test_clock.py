@@ -127,7 +127,7 @@ def test_nothing_that_is_not_simulated_runs_by_it(clock: GivenClock) -> None:
         ForceHand(live, HandSettings(kind="force"), ForceSettings(simulated=False))
 
 
-@pytest.mark.long("ten seconds in which all wait")
+@pytest.mark.long("a minute in which all wait")
 def test_who_hangs_is_waited_for_no_longer_and_named(clock: GivenClock) -> None:
     done = threading.Event()
 
