@@ -213,7 +213,9 @@ class Link:
             self._transport.close()
         with suppress(queue.Empty):
             while True:
-                self._commands.get_nowait().answer.set_exception(_gone())
+                answer = self._commands.get_nowait().answer
+                if answer.set_running_or_notify_cancel():  # somebody waits for it still
+                    answer.set_exception(_gone())
 
     def _again(self) -> Conversation | None:
         """A new connection, None once this is closed; nothing is armed."""

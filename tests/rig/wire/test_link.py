@@ -7,6 +7,7 @@ import pty
 import threading
 import tty
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from rig.device.models import device_model
 from rig.device.registers import DeviceCause, DeviceCommand, DeviceState
 from rig.live.clock import now_s, sleep, taking_part
 from rig.wire.conversation import Block
-from rig.wire.link import Link
+from rig.wire.link import Link, _Command
 from rig.wire.transports import Transport, opened_transport
 from stimuli.planted.textures import planted_texture
 from tests.refusals import refused
@@ -190,6 +191,17 @@ def test_a_command_has_a_deadline_and_the_queue_an_end(cable: Cable) -> None:
             thread.join()
         assert len(refusals) == 40
         cable.stalled = False
+
+
+def test_a_command_that_nobody_waits_for_any_more_does_not_end_the_link() -> None:
+    link = Link(lambda: opened_transport("nowhere", BAUD), DEVICE)
+    given_up, awaited = (_Command(lambda talk: None, Future()) for _ in range(2))
+    assert given_up.answer.cancel()
+    for command in (given_up, awaited):
+        link._commands.put(command)
+    link._disconnect()  # as the link's thread does where the device is lost
+    with refused(InputError, expected="device", got="none"):
+        awaited.answer.result(0)
 
 
 def test_a_hanging_control_loop_is_noticed_while_the_links_thread_lives(cable: Cable) -> None:
