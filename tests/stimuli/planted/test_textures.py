@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -220,3 +221,14 @@ def test_fit_of_a_planted_texture_finds_its_loud_layers() -> None:
     at_top = model.frequencies_hz[1, 1]
     for wanted in truth.frequencies_hz[1, 1]:
         assert np.abs(at_top - wanted).min() < 25
+
+
+def test_two_textures_under_one_seed_share_no_noise() -> None:
+    """Of one model under two names: with the same noise the records would be the same."""
+    one = planted_texture("canvas", rate_hz=RECORDER_RATE_HZ)
+    found = [
+        record_texture(replace(one, texture=name), duration_s=0.2, seed=1).recordings[-1].samples
+        for name in ("canvas", "linen")
+    ]
+    assert abs(np.corrcoef(found)[0, 1]) < 0.2
+    assert np.std(found[0]) == pytest.approx(np.std(found[1]), rel=0.2)
