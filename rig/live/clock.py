@@ -131,16 +131,14 @@ class GivenClock:
         os.close(handle)
         self._buffer = compiled().ffi.from_buffer(self._memory, require_writable=True)
         self._address = compiled().ffi.cast("void *", self._buffer)
-        self._thread = threading.Thread(target=self._run, daemon=True)
+        run = self._library.tq_clock_run
+        self._thread = threading.Thread(target=run, args=(self._address,), daemon=True)
 
     @property
     def hung(self) -> str:
         """Who was given up last, after a minute in which all waited for it; empty for nobody."""
         process, thread = divmod(int(self._library.tq_clock_hung(self._address)), 2**32)
         return f"thread {thread} of process {process}" if process else ""
-
-    def _run(self) -> None:
-        self._library.tq_clock_run(self._address)
 
     def __enter__(self) -> Self:
         self._library.tq_clock_start(self._address)
