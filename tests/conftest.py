@@ -354,8 +354,8 @@ class JackServer:
 
     def disconnect(self, source: str, target: str) -> None:
         """Undo a connection, where there is one."""
-        words = ("jack_disconnect", source, target)
-        subprocess.run(words, env=self.environment, capture_output=True, timeout=20)
+        with suppress(subprocess.TimeoutExpired, subprocess.CalledProcessError):  # see `connect`
+            self._tool("jack_disconnect", source, target, within_s=5)
 
     def freewheel(self, on: bool) -> None:
         """As fast as the clients can (on), or in real time."""

@@ -9,8 +9,6 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -22,18 +20,11 @@ from rig.force.standin import StandIn
 from rig.force.states import State
 from rig.live.clock import now_s
 from rig.live.memory import Live
+from tests.rig.force.rig_files import standing_in
 from tests.rig.force.test_processes import WALL, opened, size_n
 
 pytestmark = pytest.mark.long("the times of this machine")
 PATIENCE_S = 120.0
-
-
-@contextmanager
-def standing_in(folder: Path, patch: pytest.MonkeyPatch) -> Iterator[StandIn]:
-    patch.setenv("TACTILEQ_STANDIN", str(folder / "device"))
-    with StandIn(folder / "device") as device:
-        device.fields.began_s -= 2  # its hand has come down already
-        yield device
 
 
 def press(device: StandIn, live: Live, hand: ForceHand) -> int:

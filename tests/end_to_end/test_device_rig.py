@@ -36,7 +36,7 @@ stiffness_n_per_mm = 0.8
 
 
 @pytest.fixture
-def device() -> Iterator[Emulator]:
+def device(given_clock: None) -> Iterator[Emulator]:
     with Emulator("process") as emulator:
         yield emulator
 

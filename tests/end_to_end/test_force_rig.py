@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import signal
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -23,6 +22,7 @@ from experiments.verification.verifying import verify_data
 from modeling.vibrators.exposure import daily_exposure_m_s2
 from rig.force.standin import StandIn, library_path
 from rig.force.states import State
+from rig.live.clock import sleep
 from rig.setup.rig_file import RigFile
 from tests.end_to_end.test_session_on_a_rig import (
     STUDY,
@@ -31,7 +31,8 @@ from tests.end_to_end.test_session_on_a_rig import (
     sit_down,
     study,  # noqa: F401 (a fixture)
 )
-from tests.rig.force.rig_files import force_rig
+from tests.rig.force.rig_files import force_rig, standing_in
+from tests.rig.waiting import follow, wait_until
 
 WALL = """
 [wall]
@@ -44,10 +45,10 @@ stiffness_n_per_mm = 0.8
 
 
 @pytest.fixture
-def force_device(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[StandIn]:
-    monkeypatch.setenv("TACTILEQ_STANDIN", str(tmp_path / "device"))
-    with StandIn(tmp_path / "device") as made:
-        made.fields.began_s -= 2  # its hand has come down already
+def force_device(
+    given_clock: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[StandIn]:
+    with standing_in(tmp_path, monkeypatch) as made:
         yield made
 
 
@@ -112,11 +113,11 @@ def test_a_pose_is_written_from_three_points(
     def go(*_: object, **__: object) -> str:
         one = force_device.fields
         one.hand_stiffness, one.stroke, one.press = 60.0, 0.0, -0.02  # lifted
-        time.sleep(0.3)
+        sleep(0.3)
         one.rest = places.pop(0)
-        time.sleep(0.3)
+        sleep(0.3)
         one.press = 0.005
-        time.sleep(0.6)
+        sleep(0.6)
         return ""
 
     monkeypatch.setattr(typer, "prompt", go)
@@ -131,22 +132,25 @@ def test_a_pose_is_written_from_three_points(
 
 def press_down(parts: Any) -> None:
     """Until the hand presses; not where a busy machine was late, so that the device has let go."""
-    end = time.monotonic() + 3
-    while not parts.live.latest()["force_n"] > 0.5 and parts.reader.status.state == State.RUNNING:
-        assert time.monotonic() < end
+
+    def presses() -> bool:
         parts.live.heartbeat()
-        time.sleep(0.01)
+        let_go = parts.reader.status.state != State.RUNNING
+        return bool(let_go or parts.live.latest()["force_n"] > 0.5)
+
+    wait_until(presses, seconds=3)
 
 
 def kill_the_servo(parts: Any) -> None:
     press_down(parts)
     pid = parts.reader.pid
     os.kill(pid, signal.SIGKILL)
-    end = time.monotonic() + 20
-    while parts.reader.pid == pid or parts.reader.status.state == State.BOOT:
-        assert time.monotonic() < end
+
+    def is_replaced() -> bool:
         parts.live.heartbeat()
-        time.sleep(0.02)
+        return bool(parts.reader.pid != pid and parts.reader.status.state != State.BOOT)
+
+    wait_until(is_replaced)
 
 
 def test_a_session_with_a_wall_stores_it_and_goes_on_after_a_lost_servo(
@@ -162,10 +166,7 @@ def test_a_session_with_a_wall_stores_it_and_goes_on_after_a_lost_servo(
     def leave(parts: Any) -> None:
         press_down(parts)
         force_device.fields.stroke = 0.06
-        end = time.monotonic() + 0.8
-        while time.monotonic() < end:
-            parts.live.heartbeat()
-            time.sleep(0.01)
+        follow(0.8, parts.live.heartbeat)
 
     happens = {1: press_down, 2: kill_the_servo, 3: press_down, 4: press_down, 5: leave}
     someone = Unlucky(happens)

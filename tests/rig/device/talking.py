@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Sequence
 from typing import Any
 
@@ -88,3 +89,9 @@ def joined(blocks: Sequence[Block]) -> np.ndarray[Any, np.dtype[Any]]:
     sizes = [block.values.size for block in blocks]
     assert numbers == list(np.cumsum([numbers[0], *sizes])[:-1])
     return np.concatenate([block.values for block in blocks]).astype(RECORD)
+
+
+def free_port() -> int:
+    """A port of this computer that nobody has now."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return int(server.getsockname()[1])

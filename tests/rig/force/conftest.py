@@ -8,13 +8,10 @@ from pathlib import Path
 import pytest
 
 from rig.force.standin import StandIn
+from tests.rig.force.rig_files import standing_in
 
 
 @pytest.fixture
 def device(given_clock: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[StandIn]:
-    """The stand-in's device, which the processes of this test open."""
-    path = tmp_path / "device"
-    monkeypatch.setenv("TACTILEQ_STANDIN", str(path))
-    with StandIn(path) as made:
-        made.fields.began_s -= 2  # its hand has come down already
+    with standing_in(tmp_path, monkeypatch) as made:
         yield made

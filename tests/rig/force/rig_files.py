@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
+
+from rig.force.standin import StandIn
 from rig.setup.rig_file import RigFile
 from tests.rig.desk.rig_files import rig_file
 
@@ -19,3 +24,12 @@ def force_rig(folder: Path, *changes: tuple[str, str]) -> RigFile:
     """A rig with the stand-in as its hand, calibrated, with these changes."""
     given = (('kind = "scripted"', 'kind = "force"'), ("[latency]", FORCE))
     return rig_file(folder, *given, *changes)
+
+
+@contextmanager
+def standing_in(folder: Path, patch: pytest.MonkeyPatch) -> Iterator[StandIn]:
+    """The stand-in's device, which the processes of this test open; its hand has come down."""
+    patch.setenv("TACTILEQ_STANDIN", str(folder / "device"))
+    with StandIn(folder / "device") as made:
+        made.fields.began_s -= 2
+        yield made
