@@ -401,7 +401,8 @@ def _chains(
     for where, who, session, seal in named:
         if session in unread or session.partition("_")[0] in withdrawn:
             continue
-        about = session.partition("_")[0] if where == place else who
+        # Where the roster says the same of it, it is the log that is not as it was.
+        about = session.partition("_")[0] if (session, seal) in noted else who
         if session not in seals:
             sentence = f"expected the session {shown(session)}, which it names, got none"
         elif seal not in seals[session]:

@@ -172,6 +172,14 @@ def test_who_is_left_out_is_not_compared(copied: Path) -> None:
     assert verify_data(copied).without(["sub-02"]).differences
 
 
+def test_the_torn_log_of_who_is_left_out_costs_nobody_else(copied: Path) -> None:
+    """The next session's manifest names the seal of its last line, as does the roster."""
+    log = source(copied, FIRST, "log.jsonl")
+    log.write_bytes(log.read_bytes()[:-200])
+    assert verify_data(copied).without(["sub-01"]).differences == ()
+    assert verify_data(copied).without(["sub-02"]).differences
+
+
 def test_logs_of_earlier_versions_are_unsealed_and_otherwise_verified(copied: Path) -> None:
     """As they were before there were seals."""
     for log in copied.glob("sourcedata/sub-*/*/*_log.jsonl"):
