@@ -167,6 +167,7 @@ static inline uint64_t tq_clock_hung(const void *clock)
 #define TQ_HANGS_S 60.0   /* who is late for so long, by the computer's clock, is waited for no longer */
 #define TQ_BEHIND_S 0.01  /* a computer that is late for no longer costs no time */
 #define TQ_CALLED_S 3.0   /* who is called by others, for so long: a sound server may have died */
+#define TQ_LOOK 32 /* so often the clock is looked at before who is suspended is */
 #define TQ_UNKNOWN_S 0.02 /* who is late for so long may have ended, or be suspended on purpose */
 
 /* Who takes part: a thread, and until when it needs nothing. */
@@ -383,9 +384,15 @@ TQ_INNER int tq_can_come(uint64_t who, char *state)
     return !strchr("XZTt", *state);
 }
 
-/* The earliest moment for which somebody has to be waited for. Nobody waits for who is gone, nor for who is
-   suspended, until that goes on: `absent` says what it last waited for. */
-TQ_INNER double tq_earliest(tq_clock *clock, double *absent, double now_s, double late_s)
+/* For whom nobody waits: what it last waited for; if suspended, how often the clock was looked at since. */
+typedef struct {
+    double until_s;
+    unsigned suspended;
+} tq_absent;
+
+/* The earliest moment for which somebody has to be waited for. Nobody waits for who is gone or hangs, until
+   that waits for something else, nor for who is suspended, until that goes on. */
+TQ_INNER double tq_earliest(tq_clock *clock, tq_absent *absent, double now_s, double late_s)
 {
     double first_s = now_s + 1;
     int n;
@@ -394,13 +401,19 @@ TQ_INNER double tq_earliest(tq_clock *clock, double *absent, double now_s, doubl
         uint64_t who = __atomic_load_n(&place->who, __ATOMIC_ACQUIRE);
         double until_s = tq_take_time(&place->until);
         char state = 0;
-        if (!who || until_s >= first_s || until_s == absent[n])
+        if (!who || until_s >= first_s)
             continue;
+        if (until_s == absent[n].until_s) {
+            if (!absent[n].suspended || ++absent[n].suspended % TQ_LOOK || !tq_can_come(who, &state))
+                continue;
+            absent[n].until_s = 0;
+        }
         if (until_s <= now_s && late_s > TQ_UNKNOWN_S) {
             int comes = tq_can_come(who, &state), called = place->called && late_s > TQ_CALLED_S;
             int hangs = comes && late_s > TQ_HANGS_S;
             if (!comes || hangs || called) {
-                absent[n] = until_s;
+                absent[n].until_s = until_s;
+                absent[n].suspended = state == 'T' || state == 't';
                 if (hangs)
                     __atomic_store_n(&clock->hung, who, __ATOMIC_RELEASE);
                 if (state == 'X' || state == 'Z')
@@ -431,7 +444,7 @@ static void tq_clock_run(void *clock)
 {
     tq_clock *c = (tq_clock *)clock;
     double now_s = tq_take_time(&c->now), seen_s = tq_computer_now(), late_s = 0, behind_s = 0, step_s;
-    double absent[TQ_PLACES] = { 0 };
+    tq_absent absent[TQ_PLACES] = { 0 };
     while (!__atomic_load_n(&c->ended, __ATOMIC_ACQUIRE)) {
         double first_s = tq_earliest(c, absent, now_s, late_s), real_s = tq_computer_now(), before_s = now_s;
         behind_s += real_s - seen_s; /* the computer's clock; a little of it is caught up */

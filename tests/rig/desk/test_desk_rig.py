@@ -70,7 +70,7 @@ def test_what_was_presented_and_what_the_hand_did_is_told(
     assert set(stated["Assumed"]) == set(dict(file.assumed()))  # type: ignore[call-overload]
     assert stated["Assumed"]["limits.peak_g"]["value"] == 5.0  # type: ignore[index]
     assert stated["File"] == file.to_dict()
-    assert began_s < first_s == virtual.start_s < virtual.end_s < real_s == real.start_s
+    assert began_s < first_s == virtual.start_s < virtual.end_s <= real_s == real.start_s
     assert (virtual.surface, virtual.texture, virtual.number) == ("virtual", "PVC", 1)
     assert virtual.model_sha256 == model.sha256
     assert 0.1 < virtual.played_s < virtual.end_s - virtual.start_s + 0.1

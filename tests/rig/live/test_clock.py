@@ -85,6 +85,28 @@ def test_a_process_that_is_suspended_or_killed_is_not_waited_for(clock: GivenClo
     assert clock.hung == ""
 
 
+SUSPENDED = """
+import os, signal, time
+from rig.live.clock import now_s, sleep, taking_part
+with taking_part():
+    sleep(0.01)
+    os.kill(os.getpid(), signal.SIGSTOP)
+    time.sleep(0.1)  # the clock may take a moment to see that this process goes on
+    before_s = now_s()
+    time.sleep(0.5)
+    print(now_s() - before_s)
+"""
+
+
+def test_who_goes_on_after_it_was_suspended_is_waited_for_again(clock: GivenClock) -> None:
+    with subprocess.Popen([sys.executable, "-c", SUSPENDED], stdout=subprocess.PIPE) as other:
+        os.waitid(os.P_PID, other.pid, os.WSTOPPED)
+        sleep(0.1)
+        other.send_signal(signal.SIGCONT)
+        told, _ = other.communicate(timeout=60)
+    assert float(told) == pytest.approx(0, abs=1e-9)
+
+
 def test_what_waits_for_an_event_a_queue_or_bytes_waits_by_it(clock: GivenClock) -> None:
     never, nothing = threading.Event(), queue.Queue[int]()
     out, into = os.pipe()
