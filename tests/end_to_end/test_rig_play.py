@@ -55,7 +55,7 @@ def test_a_tone_and_a_file_leave_at_their_level(
     rig_file(tmp_path)
     file = made_set(main, tmp_path)
     with jack_server(block=128) as server:
-        words = [sys.executable, str(RECORDER), str(tmp_path / "out.npy"), "48000", "128"]
+        words = [sys.executable, str(RECORDER), str(tmp_path / "out.npy"), "48000", "128", "0"]
         recorder = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         assert recorder.stdout is not None
         assert recorder.stdout.readline() == b"ready\n"
