@@ -17,6 +17,7 @@ from rig.capture.grid import StrokeGrid
 from rig.capture.input import InputSettings
 from rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
 from tactileq.commands.record_audio import InputOptions, input_from, print_assumed
+from tests.conftest import ENDED_WITH_US
 from tests.rig.waiting import wait_until
 
 ROOT = Path(__file__).parents[2]
@@ -44,7 +45,7 @@ def play_into(server, folder: Path) -> subprocess.Popen[str]:
     np.save(folder / "noise.npy", noise.astype(np.float32))
     entry = server.wait_for_port("in_0", seconds=60)
     player = subprocess.Popen(
-        [sys.executable, str(PLAYING), str(folder / "noise.npy")],
+        [*ENDED_WITH_US, sys.executable, str(PLAYING), str(folder / "noise.npy")],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
