@@ -311,7 +311,7 @@ class JackServer:
     def environment(self) -> dict[str, str]:
         return {**os.environ, "JACK_DEFAULT_SERVER": self.name, "JACK_NO_START_SERVER": "1"}
 
-    def _tool(self, *words: str, within_s: float = 60) -> str:
+    def _tool(self, *words: str, within_s: float = 500) -> str:
         run = subprocess.run(
             words,
             env=self.environment,
@@ -325,14 +325,14 @@ class JackServer:
     def answers(self) -> bool:
         """Whether it takes clients."""
         words = ["jack_wait", "-s", self.name, "-c"]
-        run = subprocess.run(words, env=self.environment, capture_output=True, timeout=20)
+        run = subprocess.run(words, env=self.environment, capture_output=True, timeout=500)
         return b"not running" not in run.stdout
 
     def ports(self) -> list[str]:
         """Names of all ports."""
         return self._tool("jack_lsp").split()
 
-    def wait_for_port(self, part: str, *, seconds: float = 20) -> str:
+    def wait_for_port(self, part: str, *, seconds: float = 500) -> str:
         """The first port whose name contains this."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
@@ -342,7 +342,7 @@ class JackServer:
             time.sleep(0.05)
         raise AssertionError(f"expected a port with {part!r} within {seconds} s: {self.ports()}")
 
-    def wait_until_gone(self, *parts: str, seconds: float = 20) -> None:
+    def wait_until_gone(self, *parts: str, seconds: float = 500) -> None:
         """Until no port's name contains any of these: those of a killed client stay a moment."""
         end = time.monotonic() + seconds
         while left := [port for port in self.ports() if any(part in port for part in parts)]:
@@ -407,7 +407,7 @@ def _started(options: str, told: IO[bytes], *, lock: ExitStack) -> JackServer:
     JACK knows eight servers, killed ones included until one of the same name is started. A name
     that nobody has locked may still be that of a server whose test was killed.
     """
-    end = time.monotonic() + 200
+    end = time.monotonic() + 500
     while time.monotonic() < end:
         for number in range(6):
             with ExitStack() as held:
@@ -418,7 +418,7 @@ def _started(options: str, told: IO[bytes], *, lock: ExitStack) -> JackServer:
                         lock.push(held.pop_all())
                         return server
         time.sleep(0.1)
-    raise AssertionError(f"expected an audio server, got none for 200 s: {_text(told)}")
+    raise AssertionError(f"expected an audio server, got none for 500 s: {_text(told)}")
 
 
 def _lock_file(number: int) -> Path:
@@ -431,7 +431,7 @@ def _begun(name: str, options: str, told: IO[bytes]) -> JackServer | None:
     told.truncate()
     words = [*ENDED_WITH_US, *f"jackd --no-realtime --no-mlock -n {name} {options}".split()]
     process = subprocess.Popen(words, stdout=told, stderr=subprocess.STDOUT)
-    end = time.monotonic() + 20
+    end = time.monotonic() + 500
     while process.poll() is None and time.monotonic() < end:
         if "JACK server starting" in _text(told):
             return JackServer(name, process)
@@ -454,10 +454,10 @@ def _running(server: JackServer, told: IO[bytes]) -> Iterator[None]:
     before = {key: os.environ.get(key) for key in ("JACK_DEFAULT_SERVER", "JACK_NO_START_SERVER")}
     os.environ.update({key: server.environment[key] for key in before})
     try:
-        end = time.monotonic() + 20
+        end = time.monotonic() + 500
         while not server.answers():  # jack_wait would ask once a second
             if time.monotonic() > end:
-                raise AssertionError(f"expected an audio server within 20 s: {_text(told)}")
+                raise AssertionError(f"expected an audio server within 500 s: {_text(told)}")
             time.sleep(0.02)
         yield
     finally:
@@ -501,4 +501,4 @@ def _x_server(*, screens: int = 1, size: tuple[int, int] = (1920, 1080)) -> Iter
             yield f":{numbers.readline().strip()}"
     finally:
         server.terminate()
-        server.wait(timeout=10)
+        server.wait(timeout=500)

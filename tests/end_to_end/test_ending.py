@@ -193,7 +193,7 @@ def test_workers_end_with_their_parent(tmp_path: Path, number: signal.Signals) -
     pids = [tmp_path / "a.pid", tmp_path / "b.pid"]
     wait_for(lambda: all(path.exists() and path.read_text() for path in pids))
     parent.send_signal(number)
-    assert parent.wait(30) == (143 if number == signal.SIGTERM else -number)
+    assert parent.wait(500) == (143 if number == signal.SIGTERM else -number)
     workers = [int(path.read_text()) for path in pids]
     wait_for(lambda: not any(map(lives, workers)))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.pid", "b.pid"]

@@ -141,7 +141,7 @@ def test_pandas_reads_the_answers(
 @pytest.mark.skipif(shutil.which("Rscript") is None, reason="expected R (tools/system-packages)")
 def test_r_reads_the_answers(answers: pd.DataFrame) -> None:
     (code,) = blocks_of("docs/your-data.md", "r")
-    run = subprocess.run(["Rscript", "-e", code], capture_output=True, text=True, timeout=60)
+    run = subprocess.run(["Rscript", "-e", code], capture_output=True, text=True, timeout=500)
     assert run.returncode == 0, run.stderr
     expected = scipy.stats.ttest_rel(answers["simplified"], answers["full"])
     found = re.search(r"t = (\S+), df = (\d+), p-value = (\S+)", run.stdout)

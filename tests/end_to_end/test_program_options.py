@@ -39,6 +39,6 @@ def test_a_shell_completes_commands_options_and_choices(words: str, expected: se
         "COMP_CWORD": str(len(words.split(" ")) - 1),
     }
     asked = subprocess.run(
-        [sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, timeout=60
+        [sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, timeout=500
     )
     assert set(asked.stdout.split()) == expected, asked.stderr

@@ -43,7 +43,7 @@ def play_into(server, folder: Path) -> subprocess.Popen[str]:
     """Noise of 0.05 of full scale, into the recording's input."""
     noise = 0.05 * np.random.default_rng(0).normal(size=48000 * 60)
     np.save(folder / "noise.npy", noise.astype(np.float32))
-    entry = server.wait_for_port("in_0", seconds=60)
+    entry = server.wait_for_port("in_0")
     player = subprocess.Popen(
         [*ENDED_WITH_US, sys.executable, str(PLAYING), str(folder / "noise.npy")],
         stdin=subprocess.PIPE,
@@ -77,10 +77,10 @@ def test_a_recording_that_is_killed_goes_on_and_is_a_recording_set(
         wait_until(lambda: len(pieces_in(oak)) >= 2 or first.poll() is not None, seconds=60)
         assert first.poll() is None
         first.send_signal(signal.SIGKILL)
-        first.communicate(timeout=30)
+        first.communicate(timeout=500)
         before = pieces_in(oak)
         player.kill()
-        player.communicate(timeout=30)
+        player.communicate(timeout=500)
         # Else the second one's noise might go to the first one's port.
         server.wait_until_gone("in_0", "out_0")
 
@@ -89,9 +89,9 @@ def test_a_recording_that_is_killed_goes_on_and_is_a_recording_set(
         assert second.stdout is not None
         assert second.stdout.readline() == "1 of 2 conditions recorded\n"
         second.send_signal(signal.SIGINT)
-        told, warned = second.communicate(timeout=30)
+        told, warned = second.communicate(timeout=500)
         player.kill()
-        player.communicate(timeout=30)
+        player.communicate(timeout=500)
     assert second.returncode == 130
     assert "1 of 2 conditions of oak recorded in oak, 1 of them in this run (simulated)\n" in told
     assert "missing: 300 mm/s at 1.5 N; run the command again to continue" in told

@@ -51,7 +51,7 @@ def prompted(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
         input="\n" * 20,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=500,
     )
 
 
@@ -143,7 +143,7 @@ def test_a_twin_runs_with_its_rig_file_until_ctrl_c(
         again = run("rig", "twin")
         assert "error: expected a new rig file, got rig.toml, which exists" in again.stderr
         twin.send_signal(signal.SIGINT)
-        assert twin.wait(30) == 0
+        assert twin.wait(500) == 0
         twin.stdout.close()
 
 

@@ -81,7 +81,7 @@ def test_a_lost_sound_process_is_replaced_and_a_lost_server_ends_the_monitor(
         before = shared.blocks_written
         wait_until(lambda: bool(shared.blocks_since(before)[1]["peak_g"].any()))
     server.kill()
-    shown, told = monitor.communicate(timeout=60)
+    shown, told = monitor.communicate(timeout=500)
     assert monitor.returncode == 1
     assert shown.count("fault: expected the sound process to play") == 2
     assert told.startswith("error: expected ")

@@ -68,8 +68,8 @@ def test_a_tone_and_a_file_leave_at_their_level(
         )
         played = server.wait_for_port(":out_0")
         server.connect(played, server.wait_for_port(":in_0"))
-        said = tone.communicate(timeout=60)[0]
-        recorder.communicate(timeout=30)
+        said = tone.communicate(timeout=500)[0]
+        recorder.communicate(timeout=500)
         told = run("rig", "play", "--rig", "rig.toml", "--set", "set", "--file", file.name)
     assert tone.returncode == 0
     assert "signal of 1 s played 1 time" in said

@@ -45,5 +45,5 @@ class Driven:
     def close(self) -> None:
         if self._program is not None:
             self._program.kill()
-            self._program.communicate(timeout=10)
+            self._program.communicate(timeout=500)
         self._program = None

@@ -54,7 +54,7 @@ class Participant:
         self.session.stdin.flush()
 
     def xdotool(self, *words: object) -> None:
-        subprocess.run(["xdotool", *map(str, words)], env=self.environment, check=True, timeout=20)
+        subprocess.run(["xdotool", *map(str, words)], env=self.environment, check=True, timeout=500)
 
     def keys(self, *names: str) -> None:
         self.xdotool("key", "--delay", 30, *names)

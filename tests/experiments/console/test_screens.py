@@ -99,7 +99,7 @@ def pages(display: str, once_per_run: Any) -> list[dict[str, Any]]:
             env={**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)},
             capture_output=True,
             text=True,
-            timeout=400,
+            timeout=500,
         )
         assert shown.returncode == 0, shown.stderr[-2000:]
         return [json.loads(line) for line in shown.stdout.splitlines()]

@@ -49,7 +49,7 @@ class Visitor:
         return np.asarray(Image.open(path).convert("RGB")).astype(int)
 
     def xdotool(self, *words: object) -> None:
-        subprocess.run(["xdotool", *map(str, words)], env=self.environment, check=True, timeout=20)
+        subprocess.run(["xdotool", *map(str, words)], env=self.environment, check=True, timeout=500)
 
     def click(self, handle: str) -> list[object]:
         """Click on a button; what the rig is asked for then."""

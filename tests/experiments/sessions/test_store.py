@@ -134,7 +134,7 @@ def test_who_logs_never_waits_for_the_disk_and_much_goes_at_once(
 
         def standing(handle: int) -> None:
             forced.append(handle)
-            assert stuck.wait(60)
+            assert stuck.wait(500)
 
         monkeypatch.setattr(os, "fsync", standing)
         for value in range(1000):

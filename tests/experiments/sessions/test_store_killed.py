@@ -33,7 +33,7 @@ def run(*arguments: object) -> str:
     ended = subprocess.run(
         [sys.executable, str(script), *map(str, arguments)],
         env={**os.environ, "PYTHONPATH": str(ROOT)},
-        timeout=300,
+        timeout=500,
         check=True,
         capture_output=True,
         text=True,

@@ -45,7 +45,7 @@ def holder_of(work: Callable[[], Lock]) -> Iterator[int]:
     process.start()
     assert process.pid is not None
     try:
-        assert begun.wait(30)
+        assert begun.wait(500)
         yield process.pid
     finally:
         process.kill()
@@ -106,7 +106,7 @@ def test_there_are_never_two_holders(lock: Lock) -> None:
     for process in processes:
         process.start()
     for process in processes:
-        process.join(60)
+        process.join(500)
     assert [process.exitcode for process in processes] == [0] * 4
     assert together.value == 0
     assert not lock.path.exists()
@@ -124,7 +124,7 @@ def test_threads_wait_and_a_block_holds_it_again(tmp_path: Path) -> None:
         thread.start()
         thread.join(0.05)
         order.append("first")
-    thread.join(10)
+    thread.join(500)
     assert order == ["first", "other"]
     assert not list(tmp_path.iterdir())
 
@@ -143,7 +143,7 @@ def test_children_do_not_hold_it(lock: Lock) -> None:
 
         process = fork.Process(target=ask)
         process.start()
-        process.join(30)
+        process.join(500)
         assert (held.value, is_held(lock.path)) == (0, True)
         lock.release()
         Lock(lock.path).acquire(0)
@@ -202,7 +202,7 @@ def test_files_of_two_folders_are_written_in_any_order_by_two_processes(tmp_path
     for process in processes:
         process.start()
     for process in processes:
-        process.join(60)
+        process.join(500)
     assert [process.exitcode for process in processes] == [0, 0]
 
 
@@ -230,7 +230,7 @@ def test_a_folder_that_took_the_place_of_the_one_waited_for_is_held_under_its_ow
     monkeypatch.setattr(Lock, "acquire", acquire)
     writer = threading.Thread(target=write)
     writer.start()
-    assert waits.wait(5)
+    assert waits.wait(500)
     folder.rename(tmp_path / "old")
     folder.mkdir(exist_ok=True)  # the writer, which asks again meanwhile, may have made it
     lock.release()

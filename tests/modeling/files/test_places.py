@@ -27,7 +27,7 @@ def in_a_process(work: Callable[[], None]) -> int:
     """Run this in a process of its own; its exit code."""
     process = fork.Process(target=work)
     process.start()
-    process.join(60)
+    process.join(500)
     assert process.exitcode is not None
     return process.exitcode
 
@@ -132,7 +132,7 @@ def test_processes_take_turns(tmp_path: Path) -> None:
     for process in processes:
         process.start()
     for process in processes:
-        process.join(60)
+        process.join(500)
     assert [process.exitcode for process in processes] == [0] * 6
     assert counter.read_text() == "60"
     assert names(tmp_path) == ["set", "set/counter"]

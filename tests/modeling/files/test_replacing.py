@@ -172,14 +172,14 @@ def test_who_writes_into_it_meanwhile_ends_first_and_is_seen(target: Path) -> No
     def write() -> None:
         with locked(target / "mine"):
             holds.set()
-            assert goes_on.wait(30)
+            assert goes_on.wait(500)
             (target / "mine").write_bytes(b"mine")
 
     def replace() -> None:
         with replace_folder(target) as fresh:
             (fresh / "a").write_bytes(b"new")
             writer.start()
-            assert holds.wait(30)
+            assert holds.wait(500)
             threading.Timer(0.1, goes_on.set).start()
 
     writer = threading.Thread(target=write)

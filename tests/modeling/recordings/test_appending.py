@@ -169,7 +169,7 @@ def test_a_killed_addition_leaves_the_set_and_nothing_for_good(tmp_path: Path, s
     append(folder, RecordingSet([recording(50), recording(100)]), [None, None])
     made, source = wav_recording(tmp_path / "a.wav", 150, channel=2)
     append(other, RecordingSet([made]), [source])
-    child = subprocess.run([sys.executable, "-c", KILLED, step, folder, other], timeout=60)
+    child = subprocess.run([sys.executable, "-c", KILLED, step, folder, other], timeout=500)
     assert child.returncode == -signal.SIGKILL
     assert (folder / UNFINISHED_NAME).is_file() == (step != "copying")
     known = [recording(50), recording(100)]

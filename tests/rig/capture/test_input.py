@@ -35,7 +35,7 @@ def start(script: str, *arguments: object) -> subprocess.Popen[str]:
 
 
 def end(process: subprocess.Popen[str]) -> str:
-    return process.communicate("\n", timeout=60)[0]
+    return process.communicate("\n", timeout=500)[0]
 
 
 def test_what_another_client_plays_is_captured_bit_for_bit(jack_server, tmp_path: Path) -> None:
@@ -90,7 +90,7 @@ def test_a_server_that_dies_ends_the_stream(jack_server, tmp_path: Path) -> None
     with jack_server(block=256) as server:
         recording = start("capturing.py", tmp_path / "found.npz", 0)
         server.kill()
-        assert recording.wait(timeout=60) == 0
+        assert recording.wait(timeout=500) == 0
     assert not np.load(tmp_path / "found.npz")["running"]
 
 

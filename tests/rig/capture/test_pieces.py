@@ -113,7 +113,7 @@ def test_of_two_who_record_into_one_folder_none_loses_a_piece(
     monkeypatch.setattr(Lock, "acquire", told)
     with locked(tmp_path / "oak/pieces/pieces.tsv") as table:
         adding.start()
-        assert waits.wait(30)
+        assert waits.wait(500)
         first.add(piece(seed=2))
     adding.join()
     files = [line.split("\t")[0] for line in table.read_text().splitlines()[1:]]

@@ -103,7 +103,7 @@ def test_who_goes_on_after_it_was_suspended_is_waited_for_again(clock: GivenCloc
         os.waitid(os.P_PID, other.pid, os.WSTOPPED)
         sleep(0.1)
         other.send_signal(signal.SIGCONT)
-        told, _ = other.communicate(timeout=60)
+        told, _ = other.communicate(timeout=500)
     assert float(told) == pytest.approx(0, abs=1e-9)
 
 

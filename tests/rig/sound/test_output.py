@@ -121,7 +121,7 @@ class Recorder:
         """(n, 2), from when it was connected on."""
         if self._paced:
             self._server.freewheel(False)
-        self._process.communicate(timeout=30)
+        self._process.communicate(timeout=500)
         recorded: Array = np.load(self._target)
         return recorded
 

@@ -92,7 +92,7 @@ def answering(answer: Callable[[bytes], bytes]) -> Iterator[str]:
     finally:
         ended.set()
         os.write(theirs, b"\0")  # wakes it
-        thread.join(5.0)
+        thread.join(500)
         os.close(theirs)
         os.close(ours)
 

@@ -81,7 +81,7 @@ def test_the_main_loop_sends_the_dac_what_python_renders(folder: Path) -> None:
     subprocess.run([*build, "-o", "loop", "-lm"], cwd=folder, check=True)
     counts = readings()
     run = subprocess.run(
-        [folder / "loop"], input=counts.tobytes(), capture_output=True, check=True, timeout=60
+        [folder / "loop"], input=counts.tobytes(), capture_output=True, check=True, timeout=500
     )
     played = np.frombuffer(run.stdout, dtype="<u2").astype(int)
     assert (played[: 2 * HALF] == 2048).all()  # at rest until the first half is filled
