@@ -18,7 +18,7 @@ from tests.rig.waiting import wait_until
 from tests.two_surfaces import save_two_surfaces
 
 WORDS = ("session", "--task", "absolute", "--study", "study.toml", "--data", "data")
-SECONDS = 120.0  # for a hang, not for speed
+SECONDS = 500.0  # for a hang, not for speed
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ import pytest
 
 from modeling.threads import in_order
 
-PATIENCE_S = 20.0
+PATIENCE_S = 500.0
 
 
 @pytest.fixture(autouse=True)
