@@ -42,7 +42,7 @@ def test_a_rig_is_felt_until_escape(models: Path, display: str, jack_server: Jac
             end = time.monotonic() + 500
             while program.poll() is None and time.monotonic() < end:
                 keys = ["xdotool", "mousemove", "960", "540", "key", "Escape"]
-                subprocess.run(keys, env=environment, check=True, timeout=500)
+                subprocess.run(keys, env=environment, timeout=500)  # the window may just close
                 time.sleep(0.2)
             assert program.wait(500) == 0
         finally:

@@ -131,7 +131,8 @@ def test_a_pose_is_written_from_three_points(
 
 
 def press_down(parts: Any) -> None:
-    """Until the hand presses; not where a busy machine was late, so that the device has let go."""
+    """Until the hand has pressed on all of the wall; not where a busy machine was late, so that the
+    device has let go."""
 
     def presses() -> bool:
         parts.live.heartbeat()
@@ -139,6 +140,7 @@ def press_down(parts: Any) -> None:
         return bool(let_go or parts.live.latest()["force_n"] > 0.5)
 
     wait_until(presses, seconds=3)
+    follow(0.3, parts.live.heartbeat)
 
 
 def kill_the_servo(parts: Any) -> None:

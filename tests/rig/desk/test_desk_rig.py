@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import replace
@@ -58,7 +59,7 @@ def test_what_was_presented_and_what_the_hand_did_is_told(
         as_protocol: TextureRig = rig
         assert as_protocol.simulated
         assert rig.health().hand_age_s < 5
-        began_s = rig.now_s()
+        began_s, opened_s = rig.now_s(), time.monotonic()
         first_s = rig.present_model(model)
         wait(rig, 0.6)
         real_s = rig.present_real("PVC")
@@ -66,6 +67,7 @@ def test_what_was_presented_and_what_the_hand_did_is_told(
         rig.silence()
         virtual, real = rig.take_presentations()
         rows = rig.take_history()
+        lasted_s = time.monotonic() - opened_s  # JACK's server follows the computer's clock
     assert (stated["SHA256"], stated["Override"]) == (file.sha256, "a pilot")
     assert set(stated["Assumed"]) == set(dict(file.assumed()))  # type: ignore[call-overload]
     assert stated["Assumed"]["limits.peak_g"]["value"] == 5.0  # type: ignore[index]
@@ -73,7 +75,7 @@ def test_what_was_presented_and_what_the_hand_did_is_told(
     assert began_s < first_s == virtual.start_s < virtual.end_s <= real_s == real.start_s
     assert (virtual.surface, virtual.texture, virtual.number) == ("virtual", "PVC", 1)
     assert virtual.model_sha256 == model.sha256
-    assert 0.1 < virtual.played_s < virtual.end_s - virtual.start_s + 0.1
+    assert 0.1 < virtual.played_s < lasted_s
     assert 0 < virtual.rms_g < virtual.peak_g < 5.0
     assert virtual.dose_g2_s == pytest.approx(virtual.rms_g**2 * virtual.played_s)
     assert (real.surface, real.number, real.dose_g2_s, real.model_sha256) == ("real", 2, 0.0, "")
