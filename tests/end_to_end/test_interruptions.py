@@ -65,7 +65,7 @@ def place(
 ) -> Path:
     """Small inputs of every command."""
     axes = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
-    for name in ("canvas", "MDF"):
+    for name in ("canvas", "PVC"):  # a layer of PVC is dropped
         truth = planted_texture(name, **axes)
         records = record_texture(truth, duration_s=0.5)
         records.save(tmp_path / "recordings" / name)
@@ -75,8 +75,8 @@ def place(
         fewer.save(tmp_path / f"simplified/{name}{ENDING}")
     for name in ("1", "2"):
         (tmp_path / f"{name}.xml").write_text(hatt_xml(material=name), encoding="utf-8")
-    (tmp_path / "study.toml").write_text(small_study)
-    (tmp_path / "claims.toml").write_text(claimed_study)
+    (tmp_path / "study.toml").write_text(small_study.replace("MDF", "PVC"))
+    (tmp_path / "claims.toml").write_text(claimed_study.replace("MDF", "PVC"))
     for name, force_n in (("light", 1), ("strong", 3)):
         hand = f"speed_mm_s = [100, 300], force_n = [1, {force_n}]"
         scene = f'version = 1\nscene.name = "{name}"\nhand = {{{hand}}}\n'
@@ -138,12 +138,13 @@ def living(group: int) -> list[str]:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """All finished files below a folder, but for logs, whose times differ from run to run."""
+    """All finished files below a folder, but for logs and what sessions store, whose times differ
+    from run to run."""
     return {
         path.relative_to(folder).as_posix(): path.read_bytes()
         for path in sorted(folder.rglob("*"))
         if path.is_file() and not any(part.startswith(".") for part in path.parts)
-        if not path.name.endswith("_log.tsv")
+        if not path.name.endswith("_log.tsv") and "sourcedata" not in path.parts
     }
 
 
@@ -157,7 +158,7 @@ def groups(files: dict[str, bytes], name: str) -> dict[str, dict[str, bytes]]:
         return {"": files}
     return {
         texture: {file: data for file, data in files.items() if file.startswith(texture)}
-        for texture in ("canvas", "MDF")
+        for texture in ("canvas", "PVC")
     }
 
 
