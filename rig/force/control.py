@@ -26,6 +26,7 @@ class Control:
     def __init__(self, live: Live) -> None:
         self._live = live
         self._lib: Any = compiled().lib
+        self._dog = compiled().ffi.new("tq_watchdog *")
 
     @property
     def status(self) -> Status:
@@ -81,7 +82,8 @@ class Control:
 
     def missed(self, look_s: float, *, missed_s: float, since_s: float, every_s: float) -> bool:
         """Watch the servo for so long; whether it stood still (`tq_watch`)."""
-        return bool(self._lib.tq_watch(self._live.address, look_s, missed_s, since_s, every_s))
+        live, dog = self._live.address, self._dog
+        return bool(self._lib.tq_watch(live, dog, look_s, missed_s, since_s, every_s))
 
     def stood_still(self) -> None:
         """Have the state say that the watchdog has ended the servo."""

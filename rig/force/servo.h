@@ -200,25 +200,31 @@ static inline void tq_stood_still(tq_live *live)
     tq_put_word(live, TQ_WORD_STATE, (tq_word(live, TQ_WORD_ASKED) << 16) | TQ_STOOD_STILL << 8 | TQ_FAULT);
 }
 
+/* What a watchdog knows of its own looks: when the last one was, and which tick of a servo it has spared. */
+typedef struct {
+    double looked_s, since_s, spared_s;
+} tq_watchdog;
+
 /* Watches for `look_s`; whether a servo that may push has missed its ticks for longer than `missed_s`,
-   counted from `since_s` where that is later, while nothing held up this process itself. */
-static inline int tq_watch(tq_live *live, double look_s, double missed_s, double since_s, double every_s)
+   counted from `since_s` where that is later. Where this process was late itself, both may have stood still:
+   then the servo gets the time to tick once more, but not a second time without a tick. */
+static inline int tq_watch(
+    tq_live *live, tq_watchdog *dog, double look_s, double missed_s, double since_s, double every_s)
 {
-    double began_s = tq_now(), looked_s = began_s, now_s = began_s;
-    while (now_s - began_s < look_s) {
-        double tick_s = tq_figure(live, TQ_WORD_TICK);
+    double now_s = tq_now(), end_s = now_s + look_s;
+    for (; now_s < end_s; now_s = tq_now()) {
+        double tick_s = tq_figure(live, TQ_WORD_TICK), last_s = tick_s;
+        double late_s = dog->looked_s > 0 ? now_s - dog->looked_s : 0;
         int state = (int)(tq_word(live, TQ_WORD_STATE) & 255);
         tq_put_figure(live, TQ_WORD_WATCHDOG, now_s);
-        if (tick_s < since_s)
-            tick_s = since_s;
-        /* Where both processes stood still, the servo gets the time to tick first. */
-        if (now_s - looked_s > missed_s / 2)
-            since_s = now_s;
-        else if (now_s - tick_s > missed_s && state >= TQ_ARMED && state <= TQ_RELEASING)
+        last_s = last_s < since_s ? since_s : last_s;
+        last_s = last_s < dog->since_s ? dog->since_s : last_s;
+        dog->looked_s = now_s;
+        if (late_s > missed_s / 2 && tick_s != dog->spared_s)
+            dog->since_s = now_s, dog->spared_s = tick_s;
+        else if (now_s - last_s > missed_s && state >= TQ_ARMED && state <= TQ_RELEASING)
             return 1;
-        looked_s = now_s;
         tq_sleep_until(now_s + every_s);
-        now_s = tq_now();
     }
     return 0;
 }
