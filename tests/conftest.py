@@ -93,6 +93,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items[:] = sorted(chosen[True], key=uses_audio_server, reverse=True)
 
 
+def pytest_collection_finish() -> None:
+    gc.freeze()  # nor are libraries and tests ever looked through again
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[object]:
     if not uses_audio_server(item):

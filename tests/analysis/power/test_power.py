@@ -162,6 +162,7 @@ def test_a_doubted_texture_is_no_equivalent_one():
     }
 
 
+@pytest.mark.long("simulations: 300 studies")
 def test_the_chance_of_equivalence_is_that_of_the_closed_form():
     """One texture, 20 people: equivalent, or different but within bounds, in 0.80."""
     rng = np.random.default_rng(4)

@@ -235,6 +235,7 @@ def test_grains_in_motion_are_what_is_played() -> None:
     assert found / levels(filters, rate_hz) == pytest.approx(1, abs=0.075)
 
 
+@pytest.mark.long("averages: 1,500 strokes of a rival")
 def test_filters_of_fft_shaped_noise_in_motion_are_what_is_rendered() -> None:
     rate_hz = 1000.0
     grid = np.array([[0.5, 1.0], [2.0, 4.0]])[..., None] * np.linspace(1.0, 0.2, 33)

@@ -135,7 +135,7 @@ def test_a_rig_that_presents_nothing_is_refused() -> None:
 # --- Observers with a known threshold -------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long("another observer"))])
 def test_planted_thresholds_are_recovered_within_2_db_rms(seed: int) -> None:
     rng = np.random.default_rng(seed)
     planted_db = dict(zip((20.0, 80.0, 250.0, 630.0), rng.uniform(-45, -10, 4), strict=True))

@@ -129,6 +129,7 @@ def test_altered_surfaces_are_shifted_and_have_peaks_besides() -> None:
         assert level == pytest.approx(peak[2])
 
 
+@pytest.mark.long("compares estimators: four fits of whole surfaces")
 def test_joint_is_nearer_to_altered_surfaces_than_ar_of_order_6() -> None:
     """Two surfaces; a hundred others are in docs/studies/real_surfaces.md."""
     middles = halfway(list(SPEEDS_MM_S), list(FORCES_N))
