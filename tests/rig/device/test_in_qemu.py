@@ -26,7 +26,10 @@ from tests.rig.device.test_process import check_bits_of_the_host, check_client_o
 
 DOCS = Path(__file__).parents[3] / "docs"
 HAS_QEMU = all(map(shutil.which, ("qemu-system-arm", "arm-none-eabi-gcc")))
-pytestmark = pytest.mark.long("chips that QEMU emulates in real time")
+pytestmark = [
+    pytest.mark.long("chips that QEMU emulates in real time"),
+    pytest.mark.usefixtures("patient"),
+]
 FAST = 4_000_000  # carries a record at every tick
 BAND = 0.2  # for other versions of the compiler
 

@@ -1,0 +1,13 @@
+"""Patience with chips that are emulated."""
+
+from __future__ import annotations
+
+import pytest
+
+PATIENCE_S = 500.0  # an emulated clock runs at half the computer's, or less where others work
+
+
+@pytest.fixture
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A device that waits for the computer's time answers late, and is not lost."""
+    monkeypatch.setattr("rig.wire.conversation.DEADLINE_S", PATIENCE_S)
