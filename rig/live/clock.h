@@ -79,9 +79,10 @@ static inline double tq_now(void)
     return tq_computer_now();
 }
 
-static inline void tq_take_part(int takes)
+static inline int tq_take_part(int takes)
 {
     (void)takes;
+    return 0;
 }
 
 TQ_INNER double tq_expect(double time_s)
@@ -246,19 +247,20 @@ TQ_INNER void tq_know_place(void)
             tq_own_place = &clock->place[n];
 }
 
-/* From now on this thread is waited for (1; 2 where it is called by others), or no longer (0). */
-static inline void tq_take_part(int takes)
+/* From now on this thread is waited for (1; 2 where it is called by others), or no longer (0); whether that
+   is new. */
+static inline int tq_take_part(int takes)
 {
     tq_clock *clock = tq_the_clock;
     uint64_t who;
     int n;
     if (!clock || !takes == !tq_own_place)
-        return;
+        return 0;
     who = tq_this_thread();
     if (!takes) {
         __atomic_store_n(&tq_own_place->who, 0, __ATOMIC_RELEASE);
         tq_own_place = NULL;
-        return;
+        return 1;
     }
     for (n = 0; n < TQ_PLACES; n++) {
         uint64_t nobody = 0;
@@ -269,9 +271,10 @@ static inline void tq_take_part(int takes)
             tq_own_place = &clock->place[n];
             tq_own_place->called = takes == 2;
             tq_put_time(&tq_own_place->until, tq_now());
-            return;
+            return 1;
         }
     }
+    return 0;
 }
 
 /* This thread comes back by then, or a little later, and is waited for if it does not; when. */

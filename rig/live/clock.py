@@ -92,11 +92,12 @@ def holding(lock: threading.Lock) -> Iterator[None]:
 @contextmanager
 def taking_part() -> Iterator[None]:
     """A given clock waits for this thread meanwhile, wherever it does not wait for the clock."""
-    compiled().lib.tq_take_part(1)
+    begins = compiled().lib.tq_take_part(1)
     try:
         yield
     finally:
-        compiled().lib.tq_take_part(0)
+        if begins:  # else it goes on to, as before
+            compiled().lib.tq_take_part(0)
 
 
 def check_clock(what: str, *, simulated: bool) -> None:

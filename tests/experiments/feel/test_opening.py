@@ -17,7 +17,7 @@ from experiments.feel.live_rig import LiveRig
 from experiments.feel.opening import NO_SOUND, demonstration, desk
 from modeling import InputError, TextureModel, compensation_for
 from rig.force.standin import StandIn
-from rig.live.clock import now_s
+from rig.live.clock import now_s, sleep
 from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, HEARTBEAT_S, Live
 from rig.setup.rig_file import SHIPPED_RIG_FILE
 from rig.sound.devices import SoundDevice
@@ -92,7 +92,7 @@ def test_a_rig_file_plays_and_tells_its_level_its_limits_and_its_faults(
         (told,) = wait_until(felt.take_faults)
         assert "expected the sound process to play" in told
         wait_until(lambda: felt.output().rms_g > 0.01)  # another process plays on
-        time.sleep(HEARTBEAT_S + 0.3)
+        sleep(HEARTBEAT_S + 0.3)
         (told,) = wait_until(felt.take_faults)
         assert "poll the rig" in told
         assert felt.halted

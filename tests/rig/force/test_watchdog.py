@@ -9,7 +9,7 @@ import pytest
 from rig.force.control import Control
 from rig.force.settings import MISSED_S
 from rig.force.states import State
-from rig.live.clock import now_s, sleep
+from rig.live.clock import now_s, sleep, taking_part
 from rig.live.compiled import compiled
 from rig.live.memory import Live
 
@@ -20,8 +20,9 @@ def live(given_clock: object) -> Iterator[Live]:
     with Live.create() as live:
         lib = compiled().lib
         lib.tq_put_word(live.address, lib.TQ_WORD_STATE, int(State.RUNNING))
-        tick(live)
-        yield live
+        with taking_part():
+            tick(live)
+            yield live
 
 
 def tick(live: Live) -> None:
