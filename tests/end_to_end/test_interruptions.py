@@ -1,6 +1,6 @@
 """Signals at any moment: nothing lost, nothing left, nobody writing on.
 
-In `make test` two quick commands meet two moments, in `make test-long` every command three moments
+In `make test` a quick command meets two moments, in `make test-long` every command three moments
 of SIGTERM and three of SIGKILL; `TACTILEQ_MOMENTS=10` gives it ten, in half an hour.
 """
 
@@ -45,7 +45,6 @@ LONG = {
     "chart": ("bench", "chart", "--toolkit", "{}.xml", "--method", "AR(6)", "--jobs", "2"),
     "stability": ("stability", "--reduced", "--only", "{blending|vibrators}", "--jobs", "2"),
 }
-QUICK = ("import", "record")
 NEW_PLACES = ("record", "simulate")  # these refuse what is there
 
 
@@ -180,18 +179,14 @@ def assert_kept(name: str, found: dict[str, bytes], *, old: Files, new: Files) -
         assert files in (olds[group], news[group]), group
 
 
-TWO_MOMENTS = [(signal.SIGTERM, 0.8), (signal.SIGKILL, 0.9)]
-
-
 def moments(count: int) -> list[tuple[int, float]]:
     """Signals and the shares of the command's time after which they come."""
     shares = [0.2 + 0.8 * (n + 0.5) / count for n in range(count)]
     return [(number, share) for number in (signal.SIGTERM, signal.SIGKILL) for share in shares]
 
 
-@pytest.mark.parametrize("name", QUICK)
-def test_interrupted_commands_lose_nothing_and_leave_nothing(place: Path, name: str) -> None:
-    check_interrupted(place, name, TWO_MOMENTS)
+def test_an_interrupted_command_loses_nothing_and_leaves_nothing(place: Path) -> None:
+    check_interrupted(place, "record", [(signal.SIGTERM, 0.8), (signal.SIGKILL, 0.9)])
 
 
 @pytest.mark.long("interruptions at many moments")

@@ -121,7 +121,10 @@ def compared(name: str) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-@pytest.mark.parametrize("name", ["ratings", "choices", "oddity"])
+@pytest.mark.parametrize(
+    "name",
+    ["ratings", "choices", pytest.param("oddity", marks=pytest.mark.long("samples a third model"))],
+)
 def test_posterior_is_that_of_the_independent_sampler(name: str) -> None:
     table = compared(name)
     apart = (table.ours - table.golden).abs()

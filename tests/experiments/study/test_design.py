@@ -434,6 +434,7 @@ def test_anchors_leave_the_rest_as_it_is_and_no_order_of_theirs_matters(
         assert abs(first["real"] - first["virtual"]) <= 1
 
 
+@pytest.mark.long("counts places in thousands of orders")
 def test_every_place_among_the_others_is_as_likely_for_an_anchor() -> None:
     plan = TaskPlan(participants=20, schedule="interleaved", anchors={"canvas": "PVC"})
     places: Counter[int] = Counter()
@@ -514,6 +515,7 @@ def test_catch_trials_are_balanced_and_leave_the_rest_as_it_is(
     assert set(over.values()) == {count}
 
 
+@pytest.mark.long("counts places in thousands of orders")
 def test_every_place_among_the_others_is_as_likely_for_a_catch_trial() -> None:
     plan = TaskPlan(
         participants=6,

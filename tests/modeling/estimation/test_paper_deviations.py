@@ -25,6 +25,7 @@ ModelMaker = Callable[..., TextureModel]
 RATE_HZ = 5000.0
 FREQUENCY_HZ = 300.0
 NOISE_GAIN = 0.02
+SWEEP = pytest.mark.long("a sweep of hundreds of records")
 
 
 def draws(
@@ -66,7 +67,13 @@ def central_sd(values: Floats) -> float:
 
 @pytest.mark.parametrize(
     ("bandwidth_hz", "above_noise_db", "duration_s"),
-    [(20, 20, 0.5), (50, 20, 0.5), (100, 10, 0.25), (20, 10, 0.5), (50, 10, 1.0)],
+    [
+        (20, 20, 0.5),
+        *(
+            pytest.param(*one, marks=SWEEP)
+            for one in ((50, 20, 0.5), (100, 10, 0.25), (20, 10, 0.5), (50, 10, 1.0))
+        ),
+    ],
 )
 def test_joint_repeats_scatter_as_predicted(
     bandwidth_hz: float, above_noise_db: float, duration_s: float
@@ -93,7 +100,14 @@ def test_a_gain_scatters_nearly_twice_as_much_as_the_energy() -> None:
 @pytest.mark.parametrize("estimator", ["paper", "paper-consistent"])
 @pytest.mark.parametrize(
     ("bandwidth_hz", "above_noise_db", "duration_s"),
-    [(20, 20, 1.0), (50, 20, 0.5), (100, 20, 1.0), (20, 6, 1.0), (50, 6, 1.0), (10, 20, 2.0)],
+    [
+        (50, 20, 0.5),
+        (20, 6, 1.0),
+        *(
+            pytest.param(*one, marks=SWEEP)
+            for one in ((20, 20, 1.0), (100, 20, 1.0), (50, 6, 1.0), (10, 20, 2.0))
+        ),
+    ],
 )
 def test_repeats_scatter_as_predicted(
     estimator: EstimatorName, bandwidth_hz: float, above_noise_db: float, duration_s: float
@@ -174,6 +188,7 @@ def refitted_level_db(samples: Floats, first: Layers) -> float:
     return 20 * float(np.log10(rms[layer]))
 
 
+@SWEEP
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_block_bootstrap_scatters_as_predicted(estimator: EstimatorName) -> None:
     """Blocks of 0.2 s hold 8 coherence times 1/B of a 40 Hz layer."""
@@ -192,6 +207,7 @@ def test_block_bootstrap_scatters_as_predicted(estimator: EstimatorName) -> None
     assert predicted.mean() == pytest.approx(np.mean(bootstrapped), rel=0.25)
 
 
+@SWEEP
 def test_flip_probability_is_the_share_of_flips_in_a_block_bootstrap(
     make_model: ModelMaker,
 ) -> None:

@@ -14,6 +14,7 @@ from modeling import PEQ, Layers, Recording, find_layers, similarity, spectrum
 from modeling.seeds import generator
 from stimuli.planted.spectra import KINDS, RATE_HZ, RandomTruth, TruthKind, random_truth
 
+pytestmark = pytest.mark.long("a sweep of 201 random spectra")
 PER_KIND = 67
 SEED = 1
 STEP_HZ = 0.5

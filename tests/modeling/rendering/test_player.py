@@ -279,7 +279,14 @@ RACES = {
 }
 
 
-@pytest.mark.parametrize("name", RACES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("two threads", marks=pytest.mark.long("as watched for races, but for longer")),
+        "two threads, watched for races",
+        "interleaved, memory watched",
+    ],
+)
 def test_nobody_touches_a_freed_voice_and_nothing_clicks(build: Compile, name: str) -> None:
     options, samples = RACES[name]
     program = build("player_races", *options)

@@ -305,7 +305,8 @@ def test_a_range_that_is_next_to_nothing_costs_no_more_than_a_wide_one(
         assert key_of(compile_one(full, narrow))[:2] <= wide[:2]
 
 
-@settings(max_examples=12)
+@pytest.mark.long("compiles dozens of scenes")
+@settings(max_examples=60)
 @given(data=st.data())
 def test_a_narrower_scene_or_a_looser_bound_never_gets_a_dearer_model(
     data: st.DataObject,
