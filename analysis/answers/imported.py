@@ -15,7 +15,7 @@ from pathlib import Path
 import pandas as pd
 
 from modeling import InputError
-from modeling.errors import shown
+from modeling.errors import shortened, shown
 from modeling.files.reading import read_text
 
 ROLES = ("participant", "presented", "answered", "correct", "share", "value", "count")
@@ -27,6 +27,7 @@ RESERVED = frozenset(
 FEWEST_CLASSES, MOST_CLASSES = 3, 16
 MISSING = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none", "."})
 WHOLE_WITH_DECIMALS = re.compile(r"(\d+)[.,]0+")  # 1.0, as programs write whole numbers
+MOST_NAMES = 200  # characters of the names of columns that a refusal lists
 MAP_ADVICE = "write it like correct=TYPE_ANS,factor=TYPE,participant=ID"
 
 
@@ -251,7 +252,7 @@ def _place(file: _File, column: str) -> int:
     same = same or [i for i, name in enumerate(names) if name.casefold() == column.casefold()]
     if len(same) != 1:
         what = "no such column" if not same else f"{len(same)} columns of that name"
-        there = ", ".join(name for name in names if name)
+        there = shortened(", ".join(name for name in names if name), longest=MOST_NAMES)
         raise InputError(
             f"expected one column {shown(column)} in {file.header.where}, got {what}; "
             f"there are {there}."

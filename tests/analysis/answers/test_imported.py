@@ -29,6 +29,15 @@ def test_a_table_of_a_spreadsheet(tmp_path: Path) -> None:
     assert (found.missed, found.measure) == (2, "value")
 
 
+@pytest.mark.parametrize("header", ["x" * 5000, ",".join(f"column {n}" for n in range(500))])
+def test_a_missing_column_is_told_in_one_short_sentence(tmp_path: Path, header: str) -> None:
+    with pytest.raises(InputError) as told:
+        load(tmp_path, f"{header}\n1\n", "value=rating")
+    assert "'rating'" in str(told.value)
+    assert header[:100] in str(told.value).replace(", ", ",")
+    assert len(str(told.value)) < 400
+
+
 def test_the_file_names_the_participant(tmp_path: Path) -> None:
     found = load(tmp_path, "hit\tx\n1\ta\n0\tb\n", "correct=hit")
     assert list(found.answers["participant_id"]) == ["P01", "P01"]
