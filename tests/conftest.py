@@ -94,7 +94,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_collection_finish() -> None:
-    gc.freeze()  # nor are libraries and tests ever looked through again
+    gc.freeze()  # libraries and tests stay: they are not looked through for garbage
 
 
 @pytest.hookimpl(wrapper=True)
