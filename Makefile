@@ -58,7 +58,10 @@ CORE_PYTHONS ?= python3.11 python3.12 python3.13 python3.14
 WORKERS := $(shell expr $$(getconf _NPROCESSORS_ONLN) + 2)
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n $(WORKERS) --dist worksteal
 
-test: lint
+# While mypy keeps one core busy, the other collects: in a new clone each worker would otherwise
+# rewrite the assertions of all tests for itself. What cannot be collected, the tests name.
+test: install
+	@$(BIN)/pytest --collect-only -qq > /dev/null 2>&1 & $(MAKE) --no-print-directory lint && wait
 	@sh tools/system-packages
 	$(PYTEST) $(PYTEST_FLAGS)
 
