@@ -19,7 +19,7 @@ from rig.device.definition import DEVICE
 from rig.live.clock import now_s, sleep, taking_part
 from rig.wire.link import Link
 from rig.wire.transports import opened_transport
-with Link(lambda: opened_transport(sys.argv[1], 1_000_000), DEVICE) as link:
+with taking_part(), Link(lambda: opened_transport(sys.argv[1], 1_000_000), DEVICE) as link:
     while link.read("State") == 0:
         sleep(0.01)
     if link.read("State") == 5:
@@ -33,10 +33,9 @@ with Link(lambda: opened_transport(sys.argv[1], 1_000_000), DEVICE) as link:
         if now_s() > begun_s + 5:
             sys.exit(f"no force: cause {link.read('Cause')}")
     print("pushes", flush=True)
-    with taking_part():
-        while True:
-            link.beat()
-            sleep(0.02)
+    while True:
+        link.beat()
+        sleep(0.02)
 """
 
 

@@ -104,7 +104,8 @@ def device(given_clock: None) -> Iterator[Emulator]:
 
 
 def test_it_renders_the_bits_of_the_host(device: Emulator) -> None:
-    check_bits_of_the_host(device)
+    with taking_part():
+        check_bits_of_the_host(device)
 
 
 def by_the_clock(reads: list[int], writes: list[int], _: list[int], seconds: float) -> Any:
