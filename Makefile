@@ -24,7 +24,7 @@ unexport PYTHONDONTWRITEBYTECODE
 COMPILE := $(BIN)/python -W ignore -m compileall -q -j 0 -x '/tests?/'
 LOADED := numpy scipy pandas statsmodels sklearn pingouin seaborn matplotlib psychopy hypothesis _pytest
 
-.PHONY: install demo test test-long test-core quick bench plant lint lock docs-tables wheel cross clean
+.PHONY: install demo test test-long test-core quick bench plant collecting lint lock docs-tables wheel cross clean
 
 install: .venv/installed
 
@@ -60,8 +60,10 @@ PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n $(WORKERS) --dist worksteal
 
 # While mypy keeps one core busy, the other collects: in a new clone each worker would otherwise
 # rewrite the assertions of all tests for itself. What cannot be collected, the tests name.
-test: install
-	@$(BIN)/pytest --collect-only -qq > /dev/null 2>&1 & $(MAKE) --no-print-directory lint && wait
+collecting: install
+	@$(BIN)/pytest --collect-only -qq > /dev/null 2>&1 &
+
+test: collecting lint
 	@sh tools/system-packages
 	$(PYTEST) $(PYTEST_FLAGS)
 
