@@ -15,7 +15,7 @@ from rig.setup.rig_file import RigFile
 from stimuli.planted.textures import planted_texture
 
 model = planted_texture("PVC")
-with DeskRig(RigFile.load(sys.argv[1]), override="a test") as rig:
+with DeskRig(RigFile.load(sys.argv[1]), override="a test") as rig, taking_part():
     rig.arm()
     rig.present_model(model)
     reader, sound = rig.parts.reader, rig.parts.sound
@@ -27,9 +27,8 @@ with DeskRig(RigFile.load(sys.argv[1]), override="a test") as rig:
         "live": str(rig.parts.live.path),
     }
     print(json.dumps(told), flush=True)
-    with taking_part():
-        while True:
-            sleep(0.02)
-            rig.read()
-            for fault in rig.take_faults():
-                print(fault.sentence, flush=True)
+    while True:
+        sleep(0.02)
+        rig.read()
+        for fault in rig.take_faults():
+            print(fault.sentence, flush=True)
