@@ -31,4 +31,4 @@ with DeskRig(RigFile.load(sys.argv[1]), override="a test") as rig, taking_part()
         sleep(0.02)
         rig.read()
         for fault in rig.take_faults():
-            print(fault.sentence, flush=True)
+            print(fault.sentence, file=sys.stderr, flush=True)

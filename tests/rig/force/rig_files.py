@@ -28,8 +28,13 @@ def force_rig(folder: Path, *changes: tuple[str, str]) -> RigFile:
 
 @contextmanager
 def standing_in(folder: Path, patch: pytest.MonkeyPatch) -> Iterator[StandIn]:
-    """The stand-in's device, which the processes of this test open; its hand has come down."""
+    """The stand-in's device, which the processes of this test open.
+
+    Its hand has come down and rests. One that still falls swings 8 mm deep: a wall that is shown at
+    that moment is not felt before the tool is lifted.
+    """
     patch.setenv("TACTILEQ_STANDIN", str(folder / "device"))
     with StandIn(folder / "device") as made:
         made.fields.began_s -= 2
+        made.fields.position[2] = -made.fields.press
         yield made
