@@ -15,6 +15,7 @@ from rig.device.definition import DEVICE
 from rig.device.emulating import KINDS, Emulator, Kind, check_baud
 from rig.device.models import device_model
 from rig.device.registers import DeviceCommand, DeviceSource, DeviceState
+from rig.device.virtual import TICK_HZ
 from rig.live.clock import now_s, readable, sleep, taking_part
 from rig.wire.conversation import Conversation
 from rig.wire.transports import opened_transport
@@ -25,7 +26,6 @@ from tests.rig.device.independent_client import Client
 from tests.rig.device.killing import BAUD, ticks_after_kill
 from tests.rig.device.talking import joined
 from tests.rig.device.test_models import hosts_samples
-from tests.rig.waiting import follow
 
 
 def check_bits_of_the_host(device: Emulator) -> None:
@@ -36,27 +36,21 @@ def check_bits_of_the_host(device: Emulator) -> None:
         talk = Conversation(transport, DEVICE)
         hello = talk.hello()
         upload = device_model(model, hello)
-        while talk.read("State") == DeviceState.BOOT:
-            sleep(0.01)
+        until_idle(talk)
         for command in (DeviceCommand.HOME, DeviceCommand.ARM, DeviceCommand.SHOW):
             talk.write("Command", command)
         talk.write("EventRate", 5000 if hello.real_size == 4 else 1000)
         talk.upload(upload.data, upload.hash)
         talk.write("Source", DeviceSource.MODEL)
         blocks = talk.blocks()
-
-        def beat() -> None:
+        while not blocks or blocks[-1].tick < blocks[0].tick + 1.6 * TICK_HZ:
             talk.write("Heartbeat", 1)
             talk.listen(0.02)
-            blocks.extend(talk.blocks())
-
-        follow(1.6, beat, every_s=0.0)
+            blocks += talk.blocks()
         begin = talk.read("ModelTick")
         talk.write("EventRate", 0)
         talk.write("Source", DeviceSource.NOTHING)
         talk.write("Command", DeviceCommand.STOP)
-        sleep(0.1)
-        talk.write("Command", DeviceCommand.CLEAR)
     finally:
         transport.close()
     assert isinstance(begin, int)
@@ -72,12 +66,22 @@ def check_bits_of_the_host(device: Emulator) -> None:
     print(f"\n{8 * hello.real_size} bits: {size} samples, all equal")
 
 
+def until_idle(talk: Conversation) -> None:
+    """Until it can be armed, whatever it let go for before."""
+    while (state := talk.read("State")) != DeviceState.IDLE:
+        if state == DeviceState.FAULT:
+            talk.write("Command", DeviceCommand.CLEAR)
+        sleep(0.01)
+
+
 def check_client_of_the_page(device: Emulator) -> None:
     """A client written from the page alone talks to it."""
     client = Client(device.address)
     try:
         assert client.hello()["SchemaHash"] == DEVICE.schema_hash
-        while client.read(8) == bytes([DeviceState.BOOT]):
+        while (state := client.read(8)) != bytes([DeviceState.IDLE]):
+            if state == bytes([DeviceState.FAULT]):
+                client.write(10, bytes([4]))
             sleep(0.01)
         for command in (6, 1, 2):
             client.write(10, bytes([command]))
@@ -90,9 +94,9 @@ def check_client_of_the_page(device: Emulator) -> None:
         assert list(numbers) == list(range(len(records)))
         assert set(np.diff(ticks)) == {10}
         assert all(flag & 32 for flag in flags)
-        sleep(0.1)
+        while client.read(8) == bytes([DeviceState.RELEASING]):
+            sleep(0.01)
         assert client.read(8) == bytes([DeviceState.FAULT])
-        client.write(10, bytes([4]))
     finally:
         client.close()
 
