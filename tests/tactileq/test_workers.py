@@ -16,13 +16,15 @@ from tactileq.workers import mapping
 LONGEST_S = 500.0
 
 
-def test_results_keep_the_order_of_their_items():
-    def slow_first(number: int) -> tuple[int, int]:
-        time.sleep(0.5 * (number == 0))  # the first item is done last
+def test_results_keep_the_order_of_their_items(tmp_path: Path):
+    def first_after_second(number: int) -> tuple[int, int]:
+        (tmp_path / str(number)).touch()
+        while number == 0 and not (tmp_path / "2").exists():  # the other process has handed 1 in
+            time.sleep(0.01)
         return number, os.getpid()
 
     with mapping(jobs=2) as mapped:
-        found = list(mapped(slow_first, range(4)))
+        found = list(mapped(first_after_second, range(4)))
     assert [number for number, _ in found] == [0, 1, 2, 3]
     assert os.getpid() not in {process for _, process in found}
 
