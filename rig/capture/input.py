@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from modeling.arrays import Floats
 from modeling.checks import check_rate, check_whole, is_positive
 from modeling.errors import InputError, shortened, shown
-from rig.live.clock import now_s
+from rig.live.clock import called, now_s
 from rig.sound.devices import check_rate as check_device_rate
 from rig.sound.devices import find_device, portaudio
 
@@ -27,8 +27,9 @@ BLOCK_S = 0.02
 MOST_CHANNELS = 64
 # If even the most punctual of the last blocks is so much later than before, samples are missing.
 LOST_FROM_S = 0.01
-# Without a call for this long, the stream has ended.
+# Without a call for this long, the stream has ended; the first one may take so much longer.
 SILENT_S = 2.0
+BEGIN_S = 5.0
 END_S = 2.0
 # So long a callback waits for other Python threads. With Python's 5 ms blocks of a few ms were lost
 # two to five times as often (two shared cores, audio server at 48 kHz and blocks of 256).
@@ -133,7 +134,7 @@ class AudioInput:
             self.rate_hz = float(self._stream.samplerate)
             self.latency_s = float(self._stream.latency)
             self._timeline = _Timeline(self.rate_hz)
-            self._called_s = now_s()
+            self._called_s = now_s() + BEGIN_S
             self._switch_s = sys.getswitchinterval()
             sys.setswitchinterval(SWITCH_S)
             self._stream.start()
@@ -178,6 +179,7 @@ class AudioInput:
     def _take(self, data: NDArray[np.float32], frames: int, time: Any, status: Any) -> None:
         """PortAudio's callback: put the block aside, with all clocks."""
         now = self._called_s = now_s()
+        called(now + SILENT_S / 2)
         self._calls.put(
             _Call(
                 data[:, self.settings.channel - 1].astype(np.float64),

@@ -94,7 +94,7 @@ TQ_INNER void tq_know_place(void)
 {
 }
 
-TQ_INNER void tq_called(double next_s)
+static inline void tq_called(double next_s)
 {
     (void)next_s;
 }
@@ -357,7 +357,7 @@ static inline int tq_wait_readable(int one, int other, double time_s)
 }
 
 /* Who is called by others, like a sound card, tells when the next call is due. */
-TQ_INNER void tq_called(double next_s)
+static inline void tq_called(double next_s)
 {
     tq_take_part(2);
     tq_expect(next_s);

@@ -100,6 +100,12 @@ def taking_part() -> Iterator[None]:
             compiled().lib.tq_take_part(0)
 
 
+def called(next_s: float) -> None:
+    """A given clock waits for this thread, which others call: by this time, or a little later."""
+    if is_given():
+        compiled().lib.tq_called(next_s)
+
+
 def check_clock(what: str, *, simulated: bool) -> None:
     """Refuse to run anything but what is simulated by a given clock.
 

@@ -87,7 +87,8 @@ def test_a_recording_that_is_killed_goes_on_and_is_a_recording_set(
         second = begin(tmp_path, "record", "oak", *BY_HAND, *INPUT)
         player = play_into(server, tmp_path)
         assert second.stdout is not None
-        assert second.stdout.readline() == "1 of 2 conditions recorded\n"
+        line = second.stdout.readline()
+        assert line == "1 of 2 conditions recorded\n", second.communicate(timeout=500)
         second.send_signal(signal.SIGINT)
         told, warned = second.communicate(timeout=500)
         player.kill()
