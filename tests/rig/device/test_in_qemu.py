@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +19,9 @@ from rig.device.definition import DEVICE
 from rig.device.emulating import KINDS, Emulator, Kind, build_firmware
 from rig.device.models import device_model
 from rig.device.registers import DeviceCause, DeviceCommand, DeviceSource
-from rig.wire.conversation import Conversation
+from rig.wire.conversation import Conversation, DeviceRefused
 from rig.wire.transports import Transport, opened_transport
+from tests.rig.device.independent_client import Refused
 from tests.rig.device.killing import BAUD
 from tests.rig.device.test_process import (
     check_bits_of_the_host,
@@ -66,12 +67,18 @@ def device(request: pytest.FixtureRequest, once_per_run: Callable[..., Any]) -> 
 @pytest.mark.parametrize("device", ["stm32"], indirect=True)
 def test_it_renders_the_bits_of_the_host(device: Emulator) -> None:
     """In its own precision: of an STM32F405 single, against the kernel on this computer."""
-    in_time(lambda: check_bits_of_the_host(device), lambda: transport_to(device.address))
+    in_time(
+        lambda: check_bits_of_the_host(device),
+        lambda: closing(opened_transport(device.address, BAUD)),
+    )
 
 
 @pytest.mark.parametrize("device", ["m7", "stm32"], indirect=True)
 def test_a_client_written_from_the_page_alone_talks_to_it(device: Emulator) -> None:
-    in_time(lambda: check_client_of_the_page(device), lambda: transport_to(device.address))
+    in_time(
+        lambda: check_client_of_the_page(device),
+        lambda: closing(opened_transport(device.address, BAUD)),
+    )
 
 
 def in_time(
@@ -81,7 +88,7 @@ def in_time(
     while True:
         try:
             check()
-        except Exception:
+        except (AssertionError, DeviceRefused, Refused):
             with transport() as to:
                 if not let_go_unheard(to):
                     raise
@@ -94,15 +101,6 @@ def let_go_unheard(transport: Transport) -> bool:
     talk = Conversation(transport, DEVICE)
     talk.hello()
     return talk.read("Cause") in (DeviceCause.LINK, DeviceCause.HEARTBEAT)
-
-
-@contextmanager
-def transport_to(address: str) -> Iterator[Transport]:
-    transport = opened_transport(address, BAUD)
-    try:
-        yield transport
-    finally:
-        transport.close()
 
 
 def used_s(pid: int) -> float:
@@ -162,7 +160,7 @@ def counting_board(firmware: Path | None) -> Iterator[Transport]:
         try:
             assert qemu.stdout is not None
             path = qemu.stdout.readline().decode().split("redirected to ")[1].split()[0]
-            with transport_to(path) as transport:
+            with closing(opened_transport(path, BAUD)) as transport:
                 yield transport
         finally:
             qemu.kill()
