@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import os
 import re
+import secrets
 import shutil
-import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -92,15 +92,17 @@ def unfinished_folder(target: Path) -> Iterator[Path]:
 
     A folder NAME.old that still lies in it beside NAME goes back to where NAME is missing.
     """
+    made = _hidden(target)
     with ExitStack() as stack:
-        with locked(target):
-            made = Path(tempfile.mkdtemp(dir=target.parent, prefix=_prefix(target), suffix=ENDING))
-            lock, key = Lock(made / LOCK_NAME), _key(made)
-            stack.callback(_give_back, lock)
-            lock.acquire(WAIT_S)
-            _held.locks[key] = lock  # what is written right into it must not wait for this lock
-            stack.callback(_held.locks.pop, key)
         try:
+            with locked(target):
+                lock = Lock(made / LOCK_NAME)
+                stack.callback(_give_back, lock)
+                made.mkdir(0o700)
+                key = _key(made)
+                lock.acquire(WAIT_S)
+                stack.callback(_held.locks.pop, key, None)
+                _held.locks[key] = lock  # what is written right into it must not wait for this lock
             yield made
         finally:
             with suppress(OSError):
@@ -111,22 +113,24 @@ def unfinished_folder(target: Path) -> Iterator[Path]:
 def unfinished_file(target: Path, data: bytes) -> Iterator[Path]:
     """A hidden file beside `target` with these bytes, forced to disk; gone when the block ends,
     unless moved. Its folder is locked meanwhile."""
+    made = _hidden(target)
     with locked(target):
-        number, name = tempfile.mkstemp(dir=target.parent, prefix=_prefix(target), suffix=ENDING)
         try:
-            with os.fdopen(number, "wb") as file:
+            with made.open("xb") as file:
                 file.write(data)
                 file.flush()
-                os.fsync(number)
-            os.chmod(name, 0o644)
-            yield Path(name)
+                os.fsync(file.fileno())
+            made.chmod(0o644)
+            yield made
         finally:
-            with suppress(FileNotFoundError):
-                os.unlink(name)
+            made.unlink(missing_ok=True)
 
 
-def _prefix(target: Path) -> str:
-    return f".{target.name[:_NAME_LENGTH]}."
+def _hidden(target: Path) -> Path:
+    """A name beside `target` that is chosen before anything has it: a signal that comes right
+    after it was made finds who removes it."""
+    name = f".{target.name[:_NAME_LENGTH]}.{secrets.token_hex(4)}{ENDING}"
+    return target.with_name(name)
 
 
 @contextmanager

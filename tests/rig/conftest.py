@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from rig.wire.conversation import Conversation
+
 PATIENCE_S = 500.0  # an emulated clock runs at half the computer's, or less where others work
 
 
@@ -11,3 +13,4 @@ PATIENCE_S = 500.0  # an emulated clock runs at half the computer's, or less whe
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """A device that waits for the computer's time answers late, and is not lost."""
     monkeypatch.setattr("rig.wire.conversation.DEADLINE_S", PATIENCE_S)
+    monkeypatch.setitem(Conversation.hello.__kwdefaults__, "within_s", PATIENCE_S)

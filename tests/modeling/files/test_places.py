@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
+from types import FrameType
+from typing import Any
 
 import pytest
 
+from modeling.files import places
 from modeling.files.folders import check_replaceable, replace_folder
-from modeling.files.places import clear_unfinished, locked, unfinished_folder
+from modeling.files.places import clear_unfinished, locked, unfinished_file, unfinished_folder
 from modeling.files.writing import write_bytes, write_files, write_text
 
 fork = multiprocessing.get_context("fork")
@@ -200,6 +205,49 @@ def test_an_interruption_does_not_mix_old_and_new(
     with pytest.raises(KeyboardInterrupt):
         write_files(files)
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == files
+
+
+@contextmanager
+def raising_at_line(number: int) -> Iterator[None]:
+    """A signal's handler raises at this line of `places`, counted from the first that runs."""
+    left = number
+
+    def trace(frame: FrameType, event: str, _: object) -> Any:
+        nonlocal left
+        if frame.f_code.co_filename != places.__file__:
+            return None
+        if event == "line":
+            left -= 1
+            if left == 0:
+                raise KeyboardInterrupt
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        yield
+    finally:
+        sys.settrace(before)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [unfinished_folder, lambda target: unfinished_file(target, b"x")],
+    ids=["folder", "file"],
+)
+def test_an_interruption_while_a_hidden_one_is_made_leaves_nothing(
+    make: Callable[[Path], AbstractContextManager[Path]], tmp_path: Path
+) -> None:
+    for line in itertools.count(1):
+        try:
+            with raising_at_line(line), make(tmp_path / "place"):
+                sys.settrace(None)  # not where it goes
+                break
+        except KeyboardInterrupt:
+            pass
+        # A lock's file may stay: the next one takes it over.
+        assert not any(name.endswith(".unfinished") for name in names(tmp_path))
+    assert line > 10
 
 
 def test_long_names_leave_room_for_hidden_ones(tmp_path: Path) -> None:

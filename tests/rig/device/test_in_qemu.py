@@ -67,10 +67,13 @@ def device(request: pytest.FixtureRequest, once_per_run: Callable[..., Any]) -> 
 @pytest.mark.parametrize("device", ["stm32"], indirect=True)
 def test_it_renders_the_bits_of_the_host(device: Emulator) -> None:
     """In its own precision: of an STM32F405 single, against the kernel on this computer."""
-    in_time(
-        lambda: check_bits_of_the_host(device),
-        lambda: closing(opened_transport(device.address, BAUD)),
-    )
+
+    def check() -> None:
+        device.close()
+        device.open()  # its first model: a later one goes on with other noise
+        check_bits_of_the_host(device)
+
+    in_time(check, lambda: closing(opened_transport(device.address, BAUD)))
 
 
 @pytest.mark.parametrize("device", ["m7", "stm32"], indirect=True)
