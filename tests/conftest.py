@@ -494,8 +494,10 @@ def _x_server(*, screens: int = 1, size: tuple[int, int] = (1920, 1080)) -> Iter
     reader, writer = os.pipe()
     shape = "{}x{}x24".format(*size)
     sizes = [word for number in range(screens) for word in ("-screen", str(number), shape)]
+    words = ["-displayfd", str(writer), *sizes, "-nolisten", "tcp"]
     server = subprocess.Popen(
-        [*ENDED_WITH_US, "Xvfb", "-displayfd", str(writer), *sizes, "-nolisten", "tcp"],
+        # Else it begins anew when its last client leaves, and turns away who comes meanwhile.
+        [*ENDED_WITH_US, "Xvfb", "-noreset", *words],
         pass_fds=[writer],
         stderr=subprocess.DEVNULL,
     )

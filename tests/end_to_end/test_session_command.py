@@ -51,12 +51,13 @@ def log_of(study: Path) -> list[dict[str, Any]]:
     return [dict(event) for event in read_log(found[0]).events] if found else []
 
 
-def press_until(done: Callable[[], bool], display: str) -> None:
+def press_until(done: Callable[[], bool], display: str, process: subprocess.Popen[str]) -> None:
     """Press Tab and Enter now and then, as who goes on to the next page, until it has happened."""
 
     def pressed() -> bool:
         if done():
             return True
+        assert process.poll() is None, process.communicate()[1]
         subprocess.run(
             ["xdotool", "key", "Tab", "Return"], env={**os.environ, "DISPLAY": display}, check=True
         )
@@ -75,7 +76,7 @@ def test_a_session_that_is_ended_by_a_signal_goes_on_and_ends_with_its_terminal(
         events = ((event["event"], event["run"]) for event in log_of(study))
         return ("mount_requested", run) in events
 
-    press_until(lambda: asked(1), display)
+    press_until(lambda: asked(1), display, first)
     first.send_signal(signal.SIGTERM)
     first.wait(timeout=SECONDS)  # its terminal stays open until then
     _, told = first.communicate(timeout=SECONDS)
@@ -86,7 +87,7 @@ def test_a_session_that_is_ended_by_a_signal_goes_on_and_ends_with_its_terminal(
     assert (ended["by"], ended["reason"]) == ("signal", "SIGTERM")
 
     again = begin("--resume")
-    press_until(lambda: asked(2), display)
+    press_until(lambda: asked(2), display, again)
     assert again.stdin is not None
     shown, told = again.communicate(timeout=SECONDS)  # which closes what the terminal reads
     assert again.returncode == 0, told
