@@ -12,5 +12,6 @@ PATIENCE_S = 500.0  # an emulated clock runs at half the computer's, or less whe
 @pytest.fixture
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """A device that waits for the computer's time answers late, and is not lost."""
-    monkeypatch.setattr("rig.wire.conversation.DEADLINE_S", PATIENCE_S)
+    for limit in ("conversation.DEADLINE_S", "conversation.UPLOAD_S", "ports.WRITE_S"):
+        monkeypatch.setattr(f"rig.wire.{limit}", PATIENCE_S)
     monkeypatch.setitem(Conversation.hello.__kwdefaults__, "within_s", PATIENCE_S)
