@@ -133,7 +133,7 @@ class Conversation:
         """The transport's clock."""
         return self._transport.now_s()
 
-    def hello(self, *, within_s: float = HELLO_S) -> Hello:
+    def hello(self) -> Hello:
         """Begin anew; a device that was armed lets go.
 
         Raises
@@ -145,9 +145,9 @@ class Conversation:
         self._sequence, self._nonce = 0, 0
         frame = WireFrame(Kind.HELLO, 0, 0)
         before = self._heard
-        reply = self._reply(frame, within_s=within_s, again_s=_HELLO_AGAIN_S)
+        reply = self._reply(frame, within_s=HELLO_S, again_s=_HELLO_AGAIN_S)
         if reply is None:
-            raise self._unanswered(within_s, self._heard > before)
+            raise self._unanswered(something=self._heard > before)
         if len(reply.body) != 1 + _HELLO.size:
             raise InputError(self._other("a hello of another length"))
         who, version, schema, rate, size, tick = _HELLO.unpack(reply.body[1:])
@@ -335,11 +335,11 @@ class Conversation:
                 "came with this tactileq."
             )
 
-    def _unanswered(self, within_s: float, something: bool) -> InputError:
+    def _unanswered(self, *, something: bool) -> InputError:
         if something:
             return InputError(self._other("bytes that are no frames"))
         return InputError(
-            f"expected a device at {self._transport.name} to answer within {within_s:g} s, got "
+            f"expected a device at {self._transport.name} to answer within {HELLO_S:g} s, got "
             "nothing; check its power, its cable and its baud rate."
         )
 

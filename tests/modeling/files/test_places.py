@@ -210,15 +210,14 @@ def test_an_interruption_does_not_mix_old_and_new(
 @contextmanager
 def raising_at_line(number: int) -> Iterator[None]:
     """A signal's handler raises at this line of `places`, counted from the first that runs."""
-    left = number
 
     def trace(frame: FrameType, event: str, _: object) -> Any:
-        nonlocal left
+        nonlocal number
         if frame.f_code.co_filename != places.__file__:
             return None
         if event == "line":
-            left -= 1
-            if left == 0:
+            number -= 1
+            if number == 0:
                 raise KeyboardInterrupt
         return trace
 
@@ -246,7 +245,7 @@ def test_an_interruption_while_a_hidden_one_is_made_leaves_nothing(
         except KeyboardInterrupt:
             pass
         # A lock's file may stay: the next one takes it over.
-        assert not any(name.endswith(".unfinished") for name in names(tmp_path))
+        assert not list(tmp_path.rglob("*.unfinished"))
     assert line > 10
 
 

@@ -133,13 +133,14 @@ def hello_of(who: int, version: int, schema: int) -> Callable[[bytes], bytes]:
     ids=["another device", "firmware", "schema", "text", "bytes", "silence"],
 )
 def test_another_device_at_the_port_is_refused(
-    answer: Callable[[bytes], bytes], facts: dict[str, str]
+    answer: Callable[[bytes], bytes], facts: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("rig.wire.conversation.HELLO_S", 0.5)
     with answering(answer) as path:
         port = SerialTransport(path, 115_200)
         try:
             with refused(InputError, names=path, **facts):
-                Conversation(port, DEVICE).hello(within_s=0.5)
+                Conversation(port, DEVICE).hello()
         finally:
             port.close()
 
