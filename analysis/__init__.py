@@ -1,6 +1,6 @@
 """Loading, statistics, tables, figures and the report."""
 
-import modeling
+from tactileq import modeling
 
 if not hasattr(modeling, "HOMES"):  # modeling.py beside a script that is run
     raise ImportError(

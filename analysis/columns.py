@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pandas as pd
 
-from analysis.labels import ALL_LAYERS, ALL_TEXTURES
-from modeling.files.columns import Column
-from modeling.files.tables import guarded
+from tactileq.analysis.labels import ALL_LAYERS, ALL_TEXTURES
+from tactileq.modeling.files.columns import Column
+from tactileq.modeling.files.tables import guarded
 
 TEXTURE = Column("texture", is_name=True, total=ALL_TEXTURES)
 MODEL = Column("model", is_name=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
 
 # The sets of models that the statistics compare, the reference first.
 MODELS = ("full", "simplified")

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from analysis.statistics.paired import CONFIDENCE
-from analysis.statistics.rates import bootstrap_intervals
-from modeling.arrays import Bools, Floats
-from modeling.files.answer_tables import ENDS
+from tactileq.analysis.statistics.paired import CONFIDENCE
+from tactileq.analysis.statistics.rates import bootstrap_intervals
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.files.answer_tables import ENDS
 
 LOWEST, HIGHEST = ENDS
 MISS_RATE = 1 - CONFIDENCE  # of intervals, and the level of tests

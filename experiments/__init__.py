@@ -2,14 +2,14 @@
 
 from typing import TYPE_CHECKING
 
-import modeling
+from tactileq import modeling
 
 if not hasattr(modeling, "HOMES"):  # modeling.py beside a script that is run
     raise ImportError(
         f"expected the package modeling of tactileq, got {modeling}; rename that, or run python -P."
     )
 
-from modeling.face import lazily
+from tactileq.modeling.face import lazily
 
 HOMES = {
     "study.study": "Study",
@@ -29,25 +29,25 @@ HOMES = {
 }
 
 if TYPE_CHECKING:
-    from experiments.observers.in_memory import simulate_sessions as simulate_sessions
-    from experiments.observers.percepts import Perception as Perception
-    from experiments.observers.psychometrics import Psychometrics as Psychometrics
-    from experiments.observers.psychometrics import Trait as Trait
-    from experiments.observers.whole_study import simulate_study as simulate_study
-    from experiments.publishing.presented import render_presentation as render_presentation
-    from experiments.sessions.running import Circumstances as Circumstances
-    from experiments.sessions.running import run_session as run_session
-    from experiments.sessions.task import Task as Task
-    from experiments.sessions.trial_loop import People as People
-    from experiments.sessions.trial_loop import SessionResult as SessionResult
-    from experiments.sessions.trial_loop import run_trials as run_trials
-    from experiments.sessions.writer import StoreError as StoreError
-    from experiments.study.design import SessionPlan as SessionPlan
-    from experiments.study.design import fisher_yates as fisher_yates
-    from experiments.study.models import ModelSets as ModelSets
-    from experiments.study.study import Study as Study
-    from experiments.study.task_plan import TaskPlan as TaskPlan
-    from experiments.tasks import plan_session as plan_session
-    from experiments.tasks import task_named as task_named
+    from tactileq.experiments.observers.in_memory import simulate_sessions as simulate_sessions
+    from tactileq.experiments.observers.percepts import Perception as Perception
+    from tactileq.experiments.observers.psychometrics import Psychometrics as Psychometrics
+    from tactileq.experiments.observers.psychometrics import Trait as Trait
+    from tactileq.experiments.observers.whole_study import simulate_study as simulate_study
+    from tactileq.experiments.publishing.presented import render_presentation as render_presentation
+    from tactileq.experiments.sessions.running import Circumstances as Circumstances
+    from tactileq.experiments.sessions.running import run_session as run_session
+    from tactileq.experiments.sessions.task import Task as Task
+    from tactileq.experiments.sessions.trial_loop import People as People
+    from tactileq.experiments.sessions.trial_loop import SessionResult as SessionResult
+    from tactileq.experiments.sessions.trial_loop import run_trials as run_trials
+    from tactileq.experiments.sessions.writer import StoreError as StoreError
+    from tactileq.experiments.study.design import SessionPlan as SessionPlan
+    from tactileq.experiments.study.design import fisher_yates as fisher_yates
+    from tactileq.experiments.study.models import ModelSets as ModelSets
+    from tactileq.experiments.study.study import Study as Study
+    from tactileq.experiments.study.task_plan import TaskPlan as TaskPlan
+    from tactileq.experiments.tasks import plan_session as plan_session
+    from tactileq.experiments.tasks import task_named as task_named
 else:  # a type checker that saw __getattr__ would take every name for public
     __getattr__, __dir__, __all__ = lazily(__name__, HOMES)

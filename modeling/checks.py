@@ -7,7 +7,7 @@ from math import inf
 from numbers import Integral, Real
 from typing import TypeGuard
 
-from modeling.errors import InputError, shortened, shown
+from tactileq.modeling.errors import InputError, shortened, shown
 
 UNITS = ("g", "arbitrary")
 LOWEST_RATE_HZ = 1.0

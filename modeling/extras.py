@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Literal
 
-from modeling.errors import InputError
+from tactileq.modeling.errors import InputError
 
 Extra = Literal["console", "rig", "chart", "publish"]
 CONSOLE_BEFORE = (3, 13)  # PsychoPy's own limit, in pyproject.toml as well

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from modeling.arrays import Floats
+from tactileq.modeling.arrays import Floats
 
 
 class Hand(NamedTuple):

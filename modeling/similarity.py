@@ -10,12 +10,12 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Bools, Floats
-from modeling.equalizer.peq import PEQ
-from modeling.errors import InputError
-from modeling.models.ar_model import ARModel
-from modeling.recordings.recording import Recording
-from modeling.recordings.spectrum import Spectrum, smooth, spectrum
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.equalizer.peq import PEQ
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.models.ar_model import ARModel
+from tactileq.modeling.recordings.recording import Recording
+from tactileq.modeling.recordings.spectrum import Spectrum, smooth, spectrum
 
 LOWEST_HZ = 10.0
 HIGHEST_SHARE = 0.98

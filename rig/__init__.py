@@ -1,6 +1,6 @@
 """The rig, which presents surfaces to a hand, its simulated twin, and the import of recordings."""
 
-import modeling
+from tactileq import modeling
 
 if not hasattr(modeling, "HOMES"):  # modeling.py beside a script that is run
     raise ImportError(

@@ -1,6 +1,6 @@
 """A rig in silico with hands that move: the cable device's firmware on simulated mechanics.
 
-As `rig.twin`, in virtual time and marked `simulated`, but speed, force and travel are not
+As `tactileq.rig.twin`, in virtual time and marked `simulated`, but speed, force and travel are not
 prescribed: a simulated hand strokes the virtual wall, which pushes back, and the device renders
 under it (docs/cable-device.md#simulated-hands).
 """
@@ -13,16 +13,16 @@ from math import inf, nan
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from modeling.models.loading import AnyModel
-from modeling.models.texture_model import TextureModel
-from modeling.rendering.limits import Limits
-from modeling.rendering.plan import RenderCounters
-from modeling.seeds import generator
-from rig.device.definition import DEVICE
-from rig.device.models import ANY_DEVICE, device_model
-from rig.device.registers import (
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.models.loading import AnyModel
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.modeling.rendering.plan import RenderCounters
+from tactileq.modeling.seeds import generator
+from tactileq.rig.device.definition import DEVICE
+from tactileq.rig.device.models import ANY_DEVICE, device_model
+from tactileq.rig.device.registers import (
     DeviceCause,
     DeviceCommand,
     DeviceFlags,
@@ -30,9 +30,9 @@ from rig.device.registers import (
     DeviceSource,
     DeviceState,
 )
-from rig.device.virtual import TICK_HZ, VirtualBoard, VirtualTransport
-from rig.force.wall import Wall
-from rig.interface import (
+from tactileq.rig.device.virtual import TICK_HZ, VirtualBoard, VirtualTransport
+from tactileq.rig.force.wall import Wall
+from tactileq.rig.interface import (
     SURFACES,
     HandRows,
     PresentationRecord,
@@ -41,8 +41,8 @@ from rig.interface import (
     ToneBurst,
     grid_of,
 )
-from rig.twin import STEP_S, SimulatedRig
-from rig.wire.conversation import RECORD, Block, Conversation
+from tactileq.rig.twin import STEP_S, SimulatedRig
+from tactileq.rig.wire.conversation import RECORD, Block, Conversation
 
 LOOK_S = 1.5  # that each surface is stroked at least
 REACH_S, BACK_S = 2.0, 1.4  # down to the real surface, and up from it
@@ -60,7 +60,7 @@ _UNIT = 1e-6  # of the device's sums
 
 
 class DeviceTwin(SimulatedRig):
-    """The cable device in virtual time; implements `rig.interface.TextureRig`.
+    """The cable device in virtual time; implements `tactileq.rig.interface.TextureRig`.
 
     Each time it is opened another participant's hand is at it, with a stroke of its own.
 

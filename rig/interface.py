@@ -10,10 +10,10 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling.arrays import Floats
-from modeling.models.ar_model import ARModel
-from modeling.models.loading import AnyModel
-from modeling.rendering.plan import RenderCounters
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.models.ar_model import ARModel
+from tactileq.modeling.models.loading import AnyModel
+from tactileq.modeling.rendering.plan import RenderCounters
 
 Surface = Literal["none", "real", "virtual"]
 SURFACES: tuple[Surface, ...] = ("none", "real", "virtual")

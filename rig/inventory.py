@@ -15,18 +15,18 @@ from math import log10
 from pathlib import Path
 from typing import Literal
 
-from modeling.errors import InputError, counted
-from modeling.extras import Extra, MissingExtra, install_advice
-from modeling.files.provenance import version_of
-from modeling.rendering.compiled import is_compiled
-from rig.force.dhd import UNTESTED, DhdLibrary
-from rig.force.wall import largest_stiffness_n_per_mm
-from rig.hand.devices import connected_devices
-from rig.hand.sample import ConnectedDevice
-from rig.live.compiled import compiled
-from rig.setup.force_sections import DeviceSection, ForceSection
-from rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
-from rig.sound.devices import (
+from tactileq.modeling.errors import InputError, counted
+from tactileq.modeling.extras import Extra, MissingExtra, install_advice
+from tactileq.modeling.files.provenance import version_of
+from tactileq.modeling.rendering.compiled import is_compiled
+from tactileq.rig.force.dhd import UNTESTED, DhdLibrary
+from tactileq.rig.force.wall import largest_stiffness_n_per_mm
+from tactileq.rig.hand.devices import connected_devices
+from tactileq.rig.hand.sample import ConnectedDevice
+from tactileq.rig.live.compiled import compiled
+from tactileq.rig.setup.force_sections import DeviceSection, ForceSection
+from tactileq.rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
+from tactileq.rig.sound.devices import (
     Direction,
     NoPortAudio,
     SoundDevice,
@@ -224,7 +224,7 @@ def _force(rig: RigFile, force: ForceSection) -> list[Finding]:
 def _device(section: DeviceSection) -> Finding:
     """What the device says of itself; saying hello lets go what another program had armed."""
     try:
-        from rig.device.asking import asked  # needs the extra rig
+        from tactileq.rig.device.asking import asked  # needs the extra rig
 
         found = asked(section.address, section.baud)
     except InputError as error:

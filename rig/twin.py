@@ -12,13 +12,13 @@ from math import inf
 
 import numpy as np
 
-from modeling import InputError, Renderer, TextureModel
-from modeling.arrays import Floats
-from modeling.errors import shown
-from modeling.hand import Hand
-from modeling.models.loading import AnyModel
-from modeling.rendering.plan import RenderCounters
-from rig.interface import (
+from tactileq.modeling import InputError, Renderer, TextureModel
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import shown
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.models.loading import AnyModel
+from tactileq.modeling.rendering.plan import RenderCounters
+from tactileq.rig.interface import (
     SURFACES,
     Acceleration,
     Fault,
@@ -31,7 +31,7 @@ from rig.interface import (
     ToneBurst,
     grid_of,
 )
-from rig.sound.signals import tone_burst
+from tactileq.rig.sound.signals import tone_burst
 
 STEP_S = 0.01
 ROW_S = 0.002  # of the history
@@ -45,7 +45,7 @@ _PER_STEP = round(STEP_S * SIGNAL_RATE_HZ)
 
 
 class SimulatedRig:
-    """In-process twin of the rig; implements `rig.interface.TextureRig`.
+    """In-process twin of the rig; implements `tactileq.rig.interface.TextureRig`.
 
     The hand strokes back and forth, 1 Hz, up to 250 mm/s, with 1 to 2 N.
 

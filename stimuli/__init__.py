@@ -1,6 +1,6 @@
 """Surfaces with known truth, and the stimulus sets rendered from models."""
 
-import modeling
+from tactileq import modeling
 
 if not hasattr(modeling, "HOMES"):  # modeling.py beside a script that is run
     raise ImportError(

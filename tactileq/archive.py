@@ -14,7 +14,7 @@ RECORDINGS, REPORTED = "recordings", "reported_models"
 
 def is_archive(folder: Path) -> bool:
     """Whether a folder was written by `tactileq publish`."""
-    from modeling.files.provenance import PROVENANCE_NAME
+    from tactileq.modeling.files.provenance import PROVENANCE_NAME
 
     try:
         note = json.loads((folder / PROVENANCE_NAME).read_bytes())

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 from tactileq.archive import DATA, PSYCH_DS, RECORDINGS, REPORT, REPORTED, SETS_OF_MODELS, STIMULI
 
 if TYPE_CHECKING:
-    from experiments.study.publication import PublicationSection
-    from experiments.study.study import Study
+    from tactileq.experiments.study.publication import PublicationSection
+    from tactileq.experiments.study.study import Study
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -215,14 +215,14 @@ def _datacite(publication: Publication) -> dict[str, Any]:
 
 
 def _today() -> Any:
-    from experiments.sessions.log import now_utc
+    from tactileq.experiments.sessions.log import now_utc
 
     return now_utc().date()
 
 
 def _write_crate(archive: Path, publication: Publication) -> None:
     """RO-Crate metadata of the folder as it is."""
-    from modeling.extras import extra
+    from tactileq.modeling.extras import extra
 
     with extra("publish"):
         from rocrate.model.person import Person

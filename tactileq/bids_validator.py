@@ -27,8 +27,8 @@ def bids_issues(data: Path) -> list[Mapping[str, Any]]:
     InputError
         If the validator is not installed, or does not end as it should.
     """
-    from modeling import InputError
-    from modeling.extras import MissingExtra, install_advice
+    from tactileq.modeling import InputError
+    from tactileq.modeling.extras import MissingExtra, install_advice
 
     if find_spec("bids_validator_deno") is None:
         raise MissingExtra(

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from tactileq.printing import progress
 
 if TYPE_CHECKING:
-    from analysis.page.sections import Mapped, Section
-    from analysis.textures.results import TextureResult
-    from benches.atlas.case import Case
-    from benches.atlas.edges import Examined
-    from benches.chart.judging import Judged
-    from modeling import ARModel
+    from tactileq.analysis.page.sections import Mapped, Section
+    from tactileq.analysis.textures.results import TextureResult
+    from tactileq.benches.atlas.case import Case
+    from tactileq.benches.atlas.edges import Examined
+    from tactileq.benches.chart.judging import Judged
+    from tactileq.modeling import ARModel
 
 CHART_TURNS = 5
 Result = TypeVar("Result")
@@ -29,10 +29,10 @@ class Benches(NamedTuple):
     @classmethod
     def begun(cls, mapped: Mapped) -> Benches:
         """All of them, from now on."""
-        from benches.atlas.edges import columns_of, examine_column
-        from benches.chart.judging import judge
-        from benches.chart.methods import BRIEF
-        from benches.chart.surfaces import FEW_SURFACES, simulated_sources
+        from tactileq.benches.atlas.edges import columns_of, examine_column
+        from tactileq.benches.chart.judging import judge
+        from tactileq.benches.chart.methods import BRIEF
+        from tactileq.benches.chart.surfaces import FEW_SURFACES, simulated_sources
 
         cases = own_cases()
         return cls(
@@ -48,13 +48,13 @@ class Benches(NamedTuple):
         `scenes` are those of `begun_scenes`, `rivals` the AR models of the planted textures'
         recordings.
         """
-        from benches.atlas.section import stability_section
-        from benches.chart.chart import chart_of
-        from benches.chart.page import chart_section
-        from benches.chart.surfaces import FEW_SURFACES
-        from benches.scenes.examples import Surface
-        from benches.scenes.section import scene_section
-        from stimuli.planted.textures import PlantedSurface
+        from tactileq.benches.atlas.section import stability_section
+        from tactileq.benches.chart.chart import chart_of
+        from tactileq.benches.chart.page import chart_section
+        from tactileq.benches.chart.surfaces import FEW_SURFACES
+        from tactileq.benches.scenes.examples import Surface
+        from tactileq.benches.scenes.section import scene_section
+        from tactileq.stimuli.planted.textures import PlantedSurface
 
         surfaces = {m.texture: Surface(PlantedSurface(m.texture), m) for m in rivals}
         with progress("Compiling scenes", 2) as advance:
@@ -71,7 +71,7 @@ class Benches(NamedTuple):
 
 def begun_scenes(mapped: Mapped, made: Sequence[TextureResult]) -> Iterable[Any]:
     """Scenes of these models, and one of drawn surfaces, from now on."""
-    from benches.scenes.examples import DEMO_EXAMPLES, compile_examples, drawn_example
+    from tactileq.benches.scenes.examples import DEMO_EXAMPLES, compile_examples, drawn_example
 
     models = {result.texture: result.model for result in made}
     # One call, as what has one item alone is done by this process.
@@ -80,7 +80,7 @@ def begun_scenes(mapped: Mapped, made: Sequence[TextureResult]) -> Iterable[Any]
 
 def own_cases() -> Sequence[Case]:
     """Of the atlas what the program does by default; tactileq stability examines everything."""
-    from benches.atlas.cases import CASES
+    from tactileq.benches.atlas.cases import CASES
 
     return [case for case in CASES if case.ours and case.axis.default is not None]
 

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from analysis.textures.results import TextureResult
-    from experiments.observers.psychometrics import Psychometrics
-    from experiments.study.models import ModelSets
-    from modeling import TextureModel, Threshold
+    from tactileq.analysis.textures.results import TextureResult
+    from tactileq.experiments.observers.psychometrics import Psychometrics
+    from tactileq.experiments.study.models import ModelSets
+    from tactileq.modeling import TextureModel, Threshold
 
 JOBS = 2
 # Points by which simulated participants rate simplified models lower; no points elsewhere. So many
@@ -20,7 +20,7 @@ PLANTED_TEXTURE, PLANTED_POINTS = "PVC", -15.0
 
 def demo_population(textures: Sequence[str]) -> Psychometrics:
     """People to whom simplified models differ in the magnitude of one texture, and nowhere else."""
-    from experiments.observers.psychometrics import RATED_SCALES, Psychometrics
+    from tactileq.experiments.observers.psychometrics import RATED_SCALES, Psychometrics
 
     planted = {texture: dict.fromkeys(RATED_SCALES, 0.0) for texture in textures}
     planted[PLANTED_TEXTURE]["magnitude_similarity"] = PLANTED_POINTS
@@ -31,11 +31,11 @@ def modelled(
     name: str, folder: Path, *, threshold: Threshold, truth: TextureModel
 ) -> TextureResult:
     """Model and simplify the recordings of a texture in the folder."""
-    from analysis.textures.results import TextureResult
-    from modeling import RecordingSet, fit_texture
-    from modeling import simplify as drop_layers
-    from modeling.files.writing import file_stem
-    from modeling.perception.verdicts import ENDING
+    from tactileq.analysis.textures.results import TextureResult
+    from tactileq.modeling import RecordingSet, fit_texture
+    from tactileq.modeling import simplify as drop_layers
+    from tactileq.modeling.files.writing import file_stem
+    from tactileq.modeling.perception.verdicts import ENDING
 
     records = RecordingSet.load(folder / "recordings" / file_stem(name))
     full = fit_texture(records)
@@ -48,7 +48,7 @@ def modelled(
 
 def presented(made: Sequence[TextureResult]) -> tuple[ModelSets, dict[str, TextureModel]]:
     """What the virtual surfaces present, and the truth behind the real ones, by texture."""
-    from experiments.study.models import ModelSets
+    from tactileq.experiments.study.models import ModelSets
 
     models = ModelSets(
         sets={

@@ -13,7 +13,7 @@ from typing import TextIO
 from rich.console import Console
 from rich.markup import escape
 
-from experiments.sessions.people import ProgressReport, SessionAborted
+from tactileq.experiments.sessions.people import ProgressReport, SessionAborted
 
 STOP = "stop"
 PAGES = {
@@ -30,7 +30,7 @@ CLOSED = "the experimenter's terminal was closed"
 
 
 class Terminal:
-    """An experimenter at a terminal; implements `experiments.sessions.people.Experimenter`.
+    """An experimenter at a terminal; implements `tactileq.experiments.sessions.people.Experimenter`.
 
     Enter confirms what was asked last. A line "stop" ends the session at the next sample, or at
     once where one is asked for, and asks for the reason.

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from modeling.errors import counted
+from tactileq.modeling.errors import counted
 from tactileq.own_results import check_own_files, write_own_files
 from tactileq.printing import (
     clipping_warnings,
@@ -21,9 +21,9 @@ from tactileq.printing import (
 from tactileq.workers import working
 
 if TYPE_CHECKING:
-    from analysis.spectra.findings import Findings
-    from modeling import RecordingSet
-    from modeling.models.fit_summary import FitSummary
+    from tactileq.analysis.spectra.findings import Findings
+    from tactileq.modeling import RecordingSet
+    from tactileq.modeling.models.fit_summary import FitSummary
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def _model_all(
 
 def _start(source: TextureSource, out: Path) -> Path:
     """What the names of a texture's files begin with."""
-    from modeling.files.writing import file_stem
+    from tactileq.modeling.files.writing import file_stem
 
     return out / file_stem(source.texture)
 
@@ -163,11 +163,11 @@ def _write(made: _Made, start: Path, *, texture: str) -> TextureOutcome:
 
 def _model_one(source: TextureSource, *, out: Path, how: HowToModel) -> _Made:
     """Load and model one texture; what is wrong with it becomes its outcome's error."""
-    from analysis.spectra.findings import find_in, findings_files
-    from modeling.files.hashes import sha256_of_paths
-    from modeling.files.provenance import provenance_of
-    from modeling.recordings.recording_set import load_usable
-    from modeling.threads import one_linear_algebra_thread
+    from tactileq.analysis.spectra.findings import find_in, findings_files
+    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.modeling.files.provenance import provenance_of
+    from tactileq.modeling.recordings.recording_set import load_usable
+    from tactileq.modeling.threads import one_linear_algebra_thread
 
     what = f"{source.texture} in {source.folder}"
     try:
@@ -225,7 +225,7 @@ def _mended(found: Findings) -> list[str]:
 
 def _rate_notes(records: RecordingSet) -> list[str]:
     """A note where the data's rate is lower than the model's would be."""
-    from modeling.recordings.spectrum import MODEL_RATE_HZ
+    from tactileq.modeling.recordings.spectrum import MODEL_RATE_HZ
 
     rate_hz = min(r.rate_hz for r in records.recordings if r.force_n > 0)
     if rate_hz >= MODEL_RATE_HZ:
@@ -238,9 +238,9 @@ def _rate_notes(records: RecordingSet) -> list[str]:
 
 def _findings(found: Findings, start: Path, *, plot: bool) -> list[str]:
     """What was found and where it is, with the conditions that were interpolated."""
-    from analysis.textures.between import FIELD_OF_SPECTRA, sentence, worth_recording
-    from modeling import missing_conditions
-    from modeling.models.own_peaks import own_peaks
+    from tactileq.analysis.textures.between import FIELD_OF_SPECTRA, sentence, worth_recording
+    from tactileq.modeling import missing_conditions
+    from tactileq.modeling.models.own_peaks import own_peaks
 
     name, model = found.texture, found.model
     lines = (
@@ -305,7 +305,7 @@ def _nearness(fit: FitSummary) -> str:
 
 def recording_folders(folder: Path) -> list[Path]:
     """The folder itself where it is a recording set, else its sub-folders that are, by name."""
-    from modeling.recordings.recording_set import is_recording_set
+    from tactileq.modeling.recordings.recording_set import is_recording_set
 
     if is_recording_set(folder) or not folder.is_dir():
         return [folder]
@@ -315,7 +315,7 @@ def recording_folders(folder: Path) -> list[Path]:
 
 def _sources_in(folders: Iterable[Path]) -> tuple[list[TextureSource], list[TextureOutcome]]:
     """All textures in these folders, and the folders whose list cannot be read."""
-    from modeling.recordings.recording_set import textures_in
+    from tactileq.modeling.recordings.recording_set import textures_in
 
     sources: list[TextureSource] = []
     unreadable: list[TextureOutcome] = []
@@ -332,7 +332,7 @@ def _sources_in(folders: Iterable[Path]) -> tuple[list[TextureSource], list[Text
 
 def _require_own_files(sources: Iterable[TextureSource], out: Path) -> None:
     """Refuse textures whose files would overwrite each other's or another command's."""
-    from analysis.spectra.findings import FILE_ENDINGS
+    from tactileq.analysis.spectra.findings import FILE_ENDINGS
 
     taken: dict[Path, TextureSource] = {}
     for source in sources:

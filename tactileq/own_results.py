@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from modeling.files.folders import Contents
+    from tactileq.modeling.files.folders import Contents
 
 
 def check_own_results(out: Path, command: str) -> Contents:
@@ -18,8 +18,8 @@ def check_own_results(out: Path, command: str) -> Contents:
     in the folder is returned, for `replace_folder`, which puts nothing in the place of anything
     else.
     """
-    from modeling.files.folders import contents_of, folder_behind
-    from modeling.files.provenance import PROVENANCE_NAME
+    from tactileq.modeling.files.folders import contents_of, folder_behind
+    from tactileq.modeling.files.provenance import PROVENANCE_NAME
 
     seen = contents_of(folder_behind(out))
     if not out.exists():
@@ -60,7 +60,7 @@ def check_own_files(
     inputs : iterable of Path
         What the run reads.
     """
-    from modeling.files.places import clear_unfinished
+    from tactileq.modeling.files.places import clear_unfinished
 
     clear_unfinished(note.parent)
     given = [path for path in inputs if path.exists()]
@@ -109,9 +109,9 @@ def write_own_files(
 
     The provenance lists them, and what earlier runs wrote beside it for the same texture.
     """
-    from modeling.files.places import locked
-    from modeling.files.provenance import provenance_text
-    from modeling.files.writing import write_files
+    from tactileq.modeling.files.places import locked
+    from tactileq.modeling.files.provenance import provenance_text
+    from tactileq.modeling.files.writing import write_files
 
     command = str(provenance["command"]).removeprefix("tactileq ")
     with locked(note):
@@ -135,7 +135,7 @@ def _files(note: Mapping[str, Any]) -> list[str]:
 
 def _beside(folder: Path, own: Iterable[str]) -> Iterator[str]:
     """Names of files and folders below a folder that are not its own, in order."""
-    from modeling.files.places import is_hidden
+    from tactileq.modeling.files.places import is_hidden
 
     own = set(own)
     parents = {parent.as_posix() for name in own for parent in Path(name).parents}
@@ -153,6 +153,6 @@ def _beside(folder: Path, own: Iterable[str]) -> Iterator[str]:
 
 def _object(note: Path) -> dict[str, Any]:
     """What a provenance says; nothing where there is none."""
-    from modeling.files.documents import read_json_object
+    from tactileq.modeling.files.documents import read_json_object
 
     return read_json_object(note, advice="remove the file") if note.is_file() else {}

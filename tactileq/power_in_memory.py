@@ -14,20 +14,20 @@ from tactileq.workers import working
 if TYPE_CHECKING:
     import pandas as pd
 
-    from analysis.answers.responses import PlannedTask, Responses
-    from analysis.power.power import Verdict
-    from analysis.statistics.participants.posterior import Effort
-    from experiments.observers.in_memory import Row
-    from experiments.observers.percepts import Perception
-    from experiments.observers.psychometrics import Psychometrics
-    from experiments.study.models import ModelSets
-    from experiments.study.study import Study
+    from tactileq.analysis.answers.responses import PlannedTask, Responses
+    from tactileq.analysis.power.power import Verdict
+    from tactileq.analysis.statistics.participants.posterior import Effort
+    from tactileq.experiments.observers.in_memory import Row
+    from tactileq.experiments.observers.percepts import Perception
+    from tactileq.experiments.observers.psychometrics import Psychometrics
+    from tactileq.experiments.study.models import ModelSets
+    from tactileq.experiments.study.study import Study
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from experiments.study.study import Study
+    from tactileq.experiments.study.study import Study
 
 FIRST_ANSWER_S = 12.0  # then the next simulation to end is waited for
 
@@ -62,8 +62,8 @@ def planned_for(plan: Study, sizes: Sequence[int]) -> Study:
         If there is no claim, a claim is about a task that compares no models, or a number of
         participants is too small for the rule of the plan or leaves the order of models unbalanced.
     """
-    from experiments.study.study import FEWEST_OF_MODEL
-    from modeling.files.answer_tables import ANSWER_TABLES
+    from tactileq.experiments.study.study import FEWEST_OF_MODEL
+    from tactileq.modeling.files.answer_tables import ANSWER_TABLES
 
     if not plan.plan.claims:
         raise ValueError(
@@ -102,11 +102,11 @@ def people_of(
     ValueError
         For a texture that is not among them, and for models that are missing.
     """
-    from experiments.observers.percepts import Perception
-    from experiments.observers.psychometrics import Psychometrics
-    from experiments.observers.simulated import require_plantable
-    from modeling import Threshold
-    from stimuli.planted.textures import TEXTURES, planted_texture
+    from tactileq.experiments.observers.percepts import Perception
+    from tactileq.experiments.observers.psychometrics import Psychometrics
+    from tactileq.experiments.observers.simulated import require_plantable
+    from tactileq.modeling import Threshold
+    from tactileq.stimuli.planted.textures import TEXTURES, planted_texture
 
     if unknown := [name for name in study.textures if name not in TEXTURES]:
         raise ValueError(
@@ -164,9 +164,9 @@ def chances(
     Returns
     -------
     DataFrame
-        `analysis.power.power.POWER_COLUMNS`.
+        `tactileq.analysis.power.power.POWER_COLUMNS`.
     """
-    from analysis.power.power import power_table
+    from tactileq.analysis.power.power import power_table
 
     work = partial(simulated_verdicts, people, sizes, seed=seed, effort=effort)
     found: dict[int, list[Verdict]] = {}
@@ -197,9 +197,9 @@ def simulated_verdicts(
     effort: Effort | None = None,
 ) -> list[Verdict]:
     """All verdicts of one simulation: the largest study, and its first n participants."""
-    from analysis.power.power import verdicts_by_size
-    from experiments.observers.in_memory import simulate_sessions
-    from modeling.seeds import generator
+    from tactileq.analysis.power.power import verdicts_by_size
+    from tactileq.experiments.observers.in_memory import simulate_sessions
+    from tactileq.modeling.seeds import generator
 
     rng = generator(seed, number)
     rows = simulate_sessions(
@@ -219,8 +219,8 @@ def responses_of(people: SimulatedStudy, rows: dict[str, list[Row]], *, n: int) 
     """The answers of the first n participants as if they had been loaded."""
     import pandas as pd
 
-    from analysis.answers.plan import plan_from
-    from analysis.answers.responses import Responses, stands_apart
+    from tactileq.analysis.answers.plan import plan_from
+    from tactileq.analysis.answers.responses import Responses, stands_apart
 
     answers, anchors = {}, {}
     for task, of_task in rows.items():
@@ -241,8 +241,8 @@ def responses_of(people: SimulatedStudy, rows: dict[str, list[Row]], *, n: int) 
 
 
 def _planned(people: SimulatedStudy, *, n: int) -> dict[str, PlannedTask]:
-    from analysis.answers.responses import PlannedTask
-    from experiments.tasks.durations import trials_of_session
+    from tactileq.analysis.answers.responses import PlannedTask
+    from tactileq.experiments.tasks.durations import trials_of_session
 
     study, planned = people.study, {}
     for task in people.tasks:

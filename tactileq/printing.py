@@ -9,13 +9,13 @@ from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from modeling.errors import shortened
-from modeling.files.reading import reason_of
+from tactileq.modeling.errors import shortened
+from tactileq.modeling.files.reading import reason_of
 
 if TYPE_CHECKING:
-    from experiments.study.models import ModelSets
-    from modeling import RecordingSet
-    from modeling.models.loading import AnyModel
+    from tactileq.experiments.study.models import ModelSets
+    from tactileq.modeling import RecordingSet
+    from tactileq.modeling.models.loading import AnyModel
 
 
 def sentence_of(error: Exception) -> str:
@@ -117,7 +117,7 @@ def print_foreign_models(sets: ModelSets, textures: Sequence[str]) -> None:
 
 def usable_recordings(folder: Path, texture: str) -> RecordingSet:
     """The recordings of one texture; what cannot be used is left out with a warning."""
-    from modeling.recordings.recording_set import load_usable
+    from tactileq.modeling.recordings.recording_set import load_usable
 
     records, unusable = load_usable(folder, texture=texture)
     for warning in left_out_warnings(texture, unusable):

@@ -20,8 +20,8 @@ from tactileq.archive import DATA, PSYCH_DS, RECORDINGS, REPORT, REPORTED, SETS_
 from tactileq.archive_metadata import Publication, bids_description, write_metadata
 
 if TYPE_CHECKING:
-    from experiments.sessions.manifest import SessionManifest
-    from experiments.study.study import Study
+    from tactileq.experiments.sessions.manifest import SessionManifest
+    from tactileq.experiments.study.study import Study
 
 # Words of a licence that forbid giving the models to others.
 _FORBIDS = re.compile(
@@ -43,7 +43,7 @@ def check_publishable(study: Study, *, models: Iterable[str]) -> None:
     InputError
         Naming the key of the study file, or the set of models.
     """
-    from modeling import InputError
+    from tactileq.modeling import InputError
 
     stated = study.publication
     if stated is None or not stated.authors:
@@ -80,8 +80,8 @@ def checked_models(
     InputError
         For models that are not those that were presented, and for a set of another name.
     """
-    from modeling import InputError
-    from modeling.checks import check_keys
+    from tactileq.modeling import InputError
+    from tactileq.modeling.checks import check_keys
     from tactileq.verification import differing_models
 
     names = tuple(dict.fromkeys(name for one in manifests for name in one.study["models"]))
@@ -110,7 +110,7 @@ def assemble(archive: Path, publication: Publication, *, analyze: Any) -> dict[s
     InputError
         For what a part refuses, and for a file that would identify somebody.
     """
-    from experiments.publishing.redacting import redact
+    from tactileq.experiments.publishing.redacting import redact
 
     stated = publication.stated
     sources = {name: f"{SETS_OF_MODELS}/{name}" for name in publication.models}
@@ -138,7 +138,7 @@ def assemble(archive: Path, publication: Publication, *, analyze: Any) -> dict[s
 
 def _copy(place: Path, target: Path, endings: tuple[str, ...] = ("",)) -> None:
     """A folder's files with these endings, without notes on where they come from."""
-    from modeling.files.provenance import PROVENANCE_NAME
+    from tactileq.modeling.files.provenance import PROVENANCE_NAME
 
     for path in sorted(place.rglob("*")):
         named = path.name.endswith(endings) and not path.name.endswith(PROVENANCE_NAME)
@@ -187,7 +187,7 @@ def _require_nobody_named(archive: Path, secrets: Sequence[str], *, data: Path) 
     InputError
         Naming the file and what stands in it.
     """
-    from modeling import InputError
+    from tactileq.modeling import InputError
 
     for path, content in _contents(archive):
         found = next((word for word in _telling(secrets, data) if word.encode() in content), "")

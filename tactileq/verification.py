@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.sessions.manifest import SessionManifest
-    from experiments.verification.verifying import Verified
+    from tactileq.experiments.sessions.manifest import SessionManifest
+    from tactileq.experiments.verification.verifying import Verified
 
 MOST_SHOWN = 20
 
@@ -46,9 +46,9 @@ def require_verified(
     InputError
         If something differs and there is no reason to go on.
     """
-    from experiments.verification.verifying import verify_data
-    from modeling import InputError
-    from modeling.errors import counted
+    from tactileq.experiments.verification.verifying import verify_data
+    from tactileq.modeling import InputError
+    from tactileq.modeling.errors import counted
 
     found = verify_data(data).without(without)
     if not found.differences:
@@ -84,9 +84,9 @@ def differing_models(name: str, place: Path, manifests: Sequence[SessionManifest
     InputError
         If a file of models is none.
     """
-    from experiments.study.models import model_sha256
-    from modeling.models.loading import load_any_models
-    from modeling.perception.verdicts import ENDING, load_simplifications
+    from tactileq.experiments.study.models import model_sha256
+    from tactileq.modeling.models.loading import load_any_models
+    from tactileq.modeling.perception.verdicts import ENDING, load_simplifications
 
     found = load_any_models(place)
     simplified = load_simplifications(place) if any(place.glob(f"*{ENDING}")) else {}

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from experiments.sessions.manifest import SessionManifest
+    from tactileq.experiments.sessions.manifest import SessionManifest
 
 # What says where results come from, not what they are: paths and versions may differ.
 _ORIGIN = ("tables/provenance.tsv",)
@@ -37,7 +37,7 @@ def verify_models(manifests: Sequence[SessionManifest]) -> tuple[list[str], str]
     InputError
         If a file of models is none.
     """
-    from modeling.errors import counted
+    from tactileq.modeling.errors import counted
     from tactileq.verification import differing_models
 
     of_place: dict[tuple[str, Path], list[SessionManifest]] = {}
@@ -79,10 +79,10 @@ def verify_results(
     InputError
         If there are no results of analyze, or they are of other data.
     """
-    from modeling import InputError
-    from modeling.errors import counted
-    from modeling.files.documents import read_json_object
-    from modeling.files.provenance import PROVENANCE_NAME
+    from tactileq.modeling import InputError
+    from tactileq.modeling.errors import counted
+    from tactileq.modeling.files.documents import read_json_object
+    from tactileq.modeling.files.provenance import PROVENANCE_NAME
 
     note = read_json_object(results / PROVENANCE_NAME, advice="name a folder of results")
     if "sha256" not in note or note.get("command") not in _WRITERS:
@@ -121,10 +121,10 @@ def verify_archive(archive: Path) -> tuple[list[str], str]:
     InputError
         If its provenance cannot be read.
     """
-    from modeling.errors import counted
-    from modeling.files.documents import read_json_object
-    from modeling.files.hashes import seal_over
-    from modeling.files.provenance import PROVENANCE_NAME
+    from tactileq.modeling.errors import counted
+    from tactileq.modeling.files.documents import read_json_object
+    from tactileq.modeling.files.hashes import seal_over
+    from tactileq.modeling.files.provenance import PROVENANCE_NAME
 
     note = read_json_object(archive / PROVENANCE_NAME, advice="restore the archive")
     stated: Mapping[str, str] = note.get("sha256", {})
@@ -140,7 +140,7 @@ def verify_archive(archive: Path) -> tuple[list[str], str]:
 
 def _changed(folder: Path, stated: Mapping[str, str]) -> Iterator[str]:
     """Files that are not as their hashes say, not there, or not listed."""
-    from modeling.files.provenance import PROVENANCE_NAME, sha256_of_files
+    from tactileq.modeling.files.provenance import PROVENANCE_NAME, sha256_of_files
 
     there = sha256_of_files(folder)
     there.pop(PROVENANCE_NAME)
@@ -153,7 +153,7 @@ def _changed(folder: Path, stated: Mapping[str, str]) -> Iterator[str]:
 
 def _files_in(folder: Path) -> dict[str, Path]:
     """A folder's files but its provenance, by their paths in it."""
-    from modeling.files.provenance import PROVENANCE_NAME
+    from tactileq.modeling.files.provenance import PROVENANCE_NAME
 
     paths = (path for path in folder.rglob("*") if path.is_file())
     files = {path.relative_to(folder).as_posix(): path for path in paths}
@@ -162,8 +162,8 @@ def _files_in(folder: Path) -> dict[str, Path]:
 
 def require_data(note: Mapping[str, Any], data: Path, results: Path) -> None:
     """Refuse results of other data; a demo's are in its own folder."""
-    from modeling import InputError
-    from modeling.files.hashes import sha256_of_paths
+    from tactileq.modeling import InputError
+    from tactileq.modeling.files.hashes import sha256_of_paths
 
     (now,) = sha256_of_paths([data]).values()
     own = data.resolve().is_relative_to(results.resolve())
@@ -186,7 +186,7 @@ def _not_again(note: Mapping[str, Any]) -> str:
 
 
 def _other_versions(note: Mapping[str, Any]) -> str:
-    from modeling.files.provenance import version_of
+    from tactileq.modeling.files.provenance import version_of
 
     stated: Mapping[str, str] = note.get("versions", {})
     other = [f"{n} {v}" for n, v in stated.items() if version_of(n) not in (v, None)]

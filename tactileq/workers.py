@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
 from typing import Any, TypeVar
 
-from modeling.errors import shown
+from tactileq.modeling.errors import shown
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

@@ -27,7 +27,7 @@ from hypothesis import settings
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from rig.live.clock import GivenClock
+from tactileq.rig.live.clock import GivenClock
 from tests.audio_lock import LockWatch
 from tests.extras import ROOT, is_to_collect, not_collected, skip_what_lacks_packages
 from tests.selection import holds_tests, is_chosen, uses_audio_server
@@ -224,8 +224,8 @@ def _told(clock: GivenClock) -> str:
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports of this process without the time that drawing takes: no picture holds anything."""
     signature = b"\x89PNG\r\n\x1a\n"
-    monkeypatch.setattr("analysis.report.report.png_of", lambda figure, *, dpi: (signature, ""))
-    monkeypatch.setattr("analysis.report.report.svg_of", lambda figure: (b"<svg/>", ""))
+    monkeypatch.setattr("tactileq.analysis.report.report.png_of", lambda figure, *, dpi: (signature, ""))
+    monkeypatch.setattr("tactileq.analysis.report.report.svg_of", lambda figure: (b"<svg/>", ""))
 
 
 @pytest.fixture

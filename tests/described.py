@@ -17,7 +17,7 @@ from typing import Any
 
 from msgspec import inspect
 
-from modeling.files.described import DescribedFile, FileSection, Key, keys_of
+from tactileq.modeling.files.described import DescribedFile, FileSection, Key, keys_of
 
 Values = dict[str, Any]
 

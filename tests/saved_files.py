@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from experiments.sessions.manifest import SessionManifest
-from modeling.files.described_json import DescribedJson
-from modeling.models.ar_model import ARModel
-from modeling.models.regressed_model import RegressedModel
-from modeling.models.texture_model import TextureModel
-from modeling.perception.verdicts import Simplification
-from modeling.vibrators.vibrator import Vibrator
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.modeling.files.described_json import DescribedJson
+from tactileq.modeling.models.ar_model import ARModel
+from tactileq.modeling.models.regressed_model import RegressedModel
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.perception.verdicts import Simplification
+from tactileq.modeling.vibrators.vibrator import Vibrator
 from tests.described import Kind
 
 SAVED = Path(__file__).parent / "data" / "saved"

@@ -38,8 +38,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from experiments.sessions.task import Task
-from experiments.study.design import Trial, fisher_yates
+from tactileq.experiments.sessions.task import Task
+from tactileq.experiments.study.design import Trial, fisher_yates
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,8 +117,8 @@ bounds = [-0.2, 0.2]
 test = "equivalence"
 """
 MODELS = """
-from modeling import Threshold, simplify
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import Threshold, simplify
+from tactileq.stimuli.planted.textures import planted_texture
 for name in ("canvas", "PVC"):
     model = planted_texture(name)
     model.save(f"models/{name}.json")
@@ -126,7 +126,7 @@ for name in ("canvas", "PVC"):
     fewer.save(f"simplified/{name}.json")
 """
 ANSWERS = """
-from analysis.answers.loading import load_responses
+from tactileq.analysis.answers.loading import load_responses
 found = load_responses("data")
 pairs = found.answers["pair"]
 assert not found.warnings, found.warnings
@@ -142,10 +142,10 @@ from __future__ import annotations
 
 import pandas as pd
 
-from analysis.chapters.chapter import Answered
-from analysis.page.page import Table
-from analysis.page.sections import Section
-from modeling.files.columns import Column
+from tactileq.analysis.chapters.chapter import Answered
+from tactileq.analysis.page.page import Table
+from tactileq.analysis.page.sections import Section
+from tactileq.modeling.files.columns import Column
 
 
 def sections(answered: Answered) -> list[Section]:
@@ -163,7 +163,7 @@ def sections(answered: Answered) -> list[Section]:
 '''
 # Pictures take most of the time of a report; other tests draw them.
 ANALYZE = """
-from analysis.report import report
+from tactileq.analysis.report import report
 from tactileq.app import app
 report.png_of = lambda figure, *, dpi: (b"", "")
 report.svg_of = lambda figure: (b"", "")

@@ -14,24 +14,24 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
-from analysis.answers.loading import load_responses
-from experiments.sessions.bids_tables import table_bytes
-from experiments.tasks.threshold_table import READ, read_answers
-from modeling import InputError, RecordingSet, Threshold
-from modeling.files.answer_tables import ANSWER_TABLES, PARTICIPANT_COLUMNS, PARTICIPANT_ID
-from modeling.files.columns import ABOVE_0, Column, Columns, markdown, names, sidecar, without
-from modeling.files.stimulus_table import STIMULUS_COLUMNS as MANIFEST_COLUMNS
-from modeling.files.tables import Row, read_table, table_text
-from modeling.perception.thresholds import THRESHOLD_COLUMNS
-from modeling.recordings.recording_set import KNOWN_COLUMNS
-from modeling.recordings.trajectory import TRAJECTORY_COLUMNS, load_trajectory
-from modeling.scenes.microcontrollers import CONTROLLER_COLUMNS, load_microcontrollers
-from rig.capture.grid import StrokeGrid
-from rig.capture.pieces import PIECE_COLUMNS, PieceStore, Plan
-from rig.hand.scripted import SCRIPT_COLUMNS
-from rig.hand.scripted import ScriptedTrajectory as Script
-from rig.importing.labels import LABEL_COLUMNS, labels_from_table
-from rig.sound.signals import OF_SURFACES, stimuli_of_surfaces
+from tactileq.analysis.answers.loading import load_responses
+from tactileq.experiments.sessions.bids_tables import table_bytes
+from tactileq.experiments.tasks.threshold_table import READ, read_answers
+from tactileq.modeling import InputError, RecordingSet, Threshold
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES, PARTICIPANT_COLUMNS, PARTICIPANT_ID
+from tactileq.modeling.files.columns import ABOVE_0, Column, Columns, markdown, names, sidecar, without
+from tactileq.modeling.files.stimulus_table import STIMULUS_COLUMNS as MANIFEST_COLUMNS
+from tactileq.modeling.files.tables import Row, read_table, table_text
+from tactileq.modeling.perception.thresholds import THRESHOLD_COLUMNS
+from tactileq.modeling.recordings.recording_set import KNOWN_COLUMNS
+from tactileq.modeling.recordings.trajectory import TRAJECTORY_COLUMNS, load_trajectory
+from tactileq.modeling.scenes.microcontrollers import CONTROLLER_COLUMNS, load_microcontrollers
+from tactileq.rig.capture.grid import StrokeGrid
+from tactileq.rig.capture.pieces import PIECE_COLUMNS, PieceStore, Plan
+from tactileq.rig.hand.scripted import SCRIPT_COLUMNS
+from tactileq.rig.hand.scripted import ScriptedTrajectory as Script
+from tactileq.rig.importing.labels import LABEL_COLUMNS, labels_from_table
+from tactileq.rig.sound.signals import OF_SURFACES, stimuli_of_surfaces
 
 Load = Callable[[Path], object]
 ROOT = Path(__file__).parents[1]

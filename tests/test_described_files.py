@@ -15,14 +15,14 @@ import jsonschema
 import pytest
 import tomlkit
 
-from experiments.study.study import Study
-from modeling import InputError, Scene
-from modeling.files.describing import schema
-from modeling.scenes.scene import SceneFile
-from rig.recorder.recorder_file import RecorderFile
-from rig.setup.rig_file import RigFile
-from stimuli.planted.vibrators import planted_vibrator
-from stimuli.sets.recipe import Recipe
+from tactileq.experiments.study.study import Study
+from tactileq.modeling import InputError, Scene
+from tactileq.modeling.files.describing import schema
+from tactileq.modeling.scenes.scene import SceneFile
+from tactileq.rig.recorder.recorder_file import RecorderFile
+from tactileq.rig.setup.rig_file import RigFile
+from tactileq.stimuli.planted.vibrators import planted_vibrator
+from tactileq.stimuli.sets.recipe import Recipe
 from tests import saved_files
 from tests.described import Kind, Place, declared, mutations, places, toml_of
 

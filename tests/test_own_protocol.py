@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.answers.responses import Responses
-from analysis.labels import TASK_TITLES
-from analysis.report.report import write_report
-from analysis.statistics.rates import UNKNOWN_CHANCE
-from experiments.study.study import Study
-from modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
+from tactileq.analysis.answers.responses import Responses
+from tactileq.analysis.labels import TASK_TITLES
+from tactileq.analysis.report.report import write_report
+from tactileq.analysis.statistics.rates import UNKNOWN_CHANCE
+from tactileq.experiments.study.study import Study
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
 from tests.analysis.conftest import choice_table
 
 ROOT = Path(__file__).parents[1]

@@ -17,8 +17,8 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from modeling.extras import CONSOLE_BEFORE, Extra
-from modeling.rendering import compiled
+from tactileq.modeling.extras import CONSOLE_BEFORE, Extra
+from tactileq.modeling.rendering import compiled
 
 ROOT = Path(__file__).parent.parent
 ROOMS = ("modeling", "stimuli", "rig", "experiments", "analysis", "benches", "tactileq")
@@ -141,7 +141,7 @@ def test_the_core_needs_none_of_what_extras_install(tmp_path: Path) -> None:
             "import sys, pkgutil, importlib",
             f"for hidden in {HIDDEN}:",
             "    sys.modules[hidden] = None",
-            "from modeling.extras import MissingExtra",
+            "from tactileq.modeling.extras import MissingExtra",
             "refused = []",
             f"for room in map(importlib.import_module, {ROOMS}):",
             "    for module in pkgutil.walk_packages(room.__path__, f'{room.__name__}.'):",
@@ -161,11 +161,11 @@ def test_the_core_needs_none_of_what_extras_install(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     wire = (
-        *("rig.wire.", "rig.device.", "rig.device_twin", "rig.recorder."),
-        "benches.recorder.",
+        *("tactileq.rig.wire.", "tactileq.rig.device.", "tactileq.rig.device_twin", "tactileq.rig.recorder."),
+        "tactileq.benches.recorder.",
     )
     assert {name for name in done.stdout.split() if not name.startswith(wire)} <= {
-        "rig.hand.serial_sensor",
-        "experiments.console.events",
-        "experiments.feel.plots",
+        "tactileq.rig.hand.serial_sensor",
+        "tactileq.experiments.console.events",
+        "tactileq.experiments.feel.plots",
     }

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-import experiments
-import modeling
+from tactileq import experiments
+from tactileq import modeling
 from tests.refusals import refused
 
 ROOT = Path(__file__).parents[1]
@@ -61,31 +61,31 @@ def test_a_circle_would_be_seen(tmp_path: Path) -> None:
     late = tmp_path / "late.py"
     late.write_text(
         "from typing import TYPE_CHECKING\n"
-        "if TYPE_CHECKING:\n    from modeling import TextureModel\n"
-        "def f():\n    from analysis import labels\n    import rig.twin\n"
+        "if TYPE_CHECKING:\n    from tactileq.modeling import TextureModel\n"
+        "def f():\n    from tactileq.analysis import labels\n    import tactileq.rig.twin\n"
     )
     assert imported_by(late) == {
-        "modeling.models.texture_model",
-        "analysis.labels",
-        "rig.twin",
+        "tactileq.modeling.models.texture_model",
+        "tactileq.analysis.labels",
+        "tactileq.rig.twin",
     }
 
 
 PLANTED = {
-    "modeling/models/grid.py": ("from stimuli.planted import textures", "Data flows one way"),
-    "stimuli/sets/levels.py": ("import rig.twin", "Data flows one way"),
-    "analysis/labels.py": ("import experiments.study.study", "Data flows one way"),
+    "modeling/models/grid.py": ("from tactileq.stimuli.planted import textures", "Data flows one way"),
+    "stimuli/sets/levels.py": ("import tactileq.rig.twin", "Data flows one way"),
+    "analysis/labels.py": ("import tactileq.experiments.study.study", "Data flows one way"),
     "rig/interface.py": ("import tactileq.app", "Data flows one way"),
-    "modeling/equalizer/bands.py": ("import modeling.models.grid", "Floors of modeling"),
-    "modeling/fitting/field.py": ("import modeling.regression.driving", "Floors of modeling"),
-    "stimuli/planted/textures.py": ("import stimuli.sets.recipe", "Floors of stimuli"),
-    "rig/importing/files.py": ("import rig.twin", "Floors of rig"),
-    "experiments/study/study.py": ("import experiments.sessions.store", "Floors of experiments"),
-    "analysis/statistics/holm.py": ("import analysis.figures.answers", "Floors of analysis"),
-    "analysis/spectra/findings.py": ("import benches.rendering.bench", "Data flows one way"),
-    "benches/rendering/clicks.py": ("import benches.atlas.tables", "Floors of the benches"),
+    "modeling/equalizer/bands.py": ("import tactileq.modeling.models.grid", "Floors of modeling"),
+    "modeling/fitting/field.py": ("import tactileq.modeling.regression.driving", "Floors of modeling"),
+    "stimuli/planted/textures.py": ("import tactileq.stimuli.sets.recipe", "Floors of stimuli"),
+    "rig/importing/files.py": ("import tactileq.rig.twin", "Floors of rig"),
+    "experiments/study/study.py": ("import tactileq.experiments.sessions.store", "Floors of experiments"),
+    "analysis/statistics/holm.py": ("import tactileq.analysis.figures.answers", "Floors of analysis"),
+    "analysis/spectra/findings.py": ("import tactileq.benches.rendering.bench", "Data flows one way"),
+    "benches/rendering/clicks.py": ("import tactileq.benches.atlas.tables", "Floors of the benches"),
     "analysis/chapters/hand/speed.py": (
-        "import analysis.chapters.speed.section",
+        "import tactileq.analysis.chapters.speed.section",
         "A chapter of the report imports no other",
     ),
     "tactileq/printing.py": ("import tactileq.commands.demo", "Floors of the command line"),
@@ -159,12 +159,12 @@ def loaded_after(statements: str) -> list[str]:
 
 
 def test_errors_load_neither_numerics_nor_the_rest_of_modeling() -> None:
-    loaded = loaded_after("import modeling.errors")
+    loaded = loaded_after("import tactileq.modeling.errors")
     assert "numpy" not in loaded
     assert {name for name in loaded if name.startswith("modeling")} == {
         "modeling",
-        "modeling.errors",
-        "modeling.face",
+        "tactileq.modeling.errors",
+        "tactileq.modeling.face",
     }
 
 
@@ -181,8 +181,8 @@ def test_help_loads_no_numerics() -> None:
 
 def test_no_public_name_of_modeling_loads_what_only_some_of_it_needs() -> None:
     # SciPy as a whole: importing any of its parts takes longer than all of the modeling.
-    loaded = loaded_after(f"from modeling import {', '.join(modeling.__all__)}")
-    assert "modeling.rendering.renderer" in loaded
+    loaded = loaded_after(f"from tactileq.modeling import {', '.join(modeling.__all__)}")
+    assert "tactileq.modeling.rendering.renderer" in loaded
     assert not HEAVY & set(loaded)
 
 
@@ -242,7 +242,7 @@ def test_another_file_under_the_name_of_a_room_is_told_in_one_sentence(tmp_path:
         "    try:\n        __import__(room)\n"
         "    except ImportError as error:\n        print(error)\n"
         "import shutil; shutil.rmtree('analysis')\n"
-        "import analysis.columns\n"
+        "import tactileq.analysis.columns\n"
     )
     run = subprocess.run(
         [sys.executable, script], cwd=tmp_path, capture_output=True, text=True, check=False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from stimuli.planted.textures import planted_texture
+from tactileq.stimuli.planted.textures import planted_texture
 
 STUDY = """
 name = "Two surfaces"

@@ -1,11 +1,11 @@
 """The C parts of the project and their cffi bindings; run by setup.py, without the project.
 
-`modeling.rendering._kernel` is the rendering kernel, `_kernel_single` the same in single precision,
-`_many` renders many streams side by side, `modeling.estimation._slopes` is what the fit of layers
-spends its time on, `benches.rendering._rivals` is what the bench compares,
-`rig.live._live` is the memory that processes of a rig share, the callback that plays and the servo
-of a force device, `rig.force._standin` a stand-in for the library of its maker,
-`rig.device._device` the firmware on a simulated board, `rig.recorder._recorder` the recorder's
+`tactileq.modeling.rendering._kernel` is the rendering kernel, `_kernel_single` the same in single precision,
+`_many` renders many streams side by side, `tactileq.modeling.estimation._slopes` is what the fit of layers
+spends its time on, `tactileq.benches.rendering._rivals` is what the bench compares,
+`tactileq.rig.live._live` is the memory that processes of a rig share, the callback that plays and the servo
+of a force device, `tactileq.rig.force._standin` a stand-in for the library of its maker,
+`tactileq.rig.device._device` the firmware on a simulated board, `tactileq.rig.recorder._recorder` the recorder's
 law on simulated mechanics.
 """
 
@@ -79,11 +79,11 @@ def binding(
     return builder
 
 
-kernel = binding("modeling.rendering._kernel", KERNEL)
-kernel_single = binding("modeling.rendering._kernel_single", KERNEL, real="float")
-rivals = binding("benches.rendering._rivals", KERNEL, RIVALS, SOUNDS)
+kernel = binding("tactileq.modeling.rendering._kernel", KERNEL)
+kernel_single = binding("tactileq.modeling.rendering._kernel_single", KERNEL, real="float")
+rivals = binding("tactileq.benches.rendering._rivals", KERNEL, RIVALS, SOUNDS)
 many = binding(
-    "modeling.rendering._many",
+    "tactileq.modeling.rendering._many",
     KERNEL,
     MANY,
     constants="TQ_BLOCK, TQ_STREAMS",
@@ -91,12 +91,12 @@ many = binding(
     arguments=VECTOR_ARGUMENTS,
 )
 slopes = binding(
-    "modeling.estimation._slopes", SLOPES, constants="TQ_SUMS", arguments=VECTOR_ARGUMENTS
+    "tactileq.modeling.estimation._slopes", SLOPES, constants="TQ_SUMS", arguments=VECTOR_ARGUMENTS
 )
 
 
 def live_binding() -> FFI:
-    """The builder of `rig.live._live`; what processes or threads share is opaque to Python."""
+    """The builder of `tactileq.rig.live._live`; what processes or threads share is opaque to Python."""
     voice = re.search(
         r"^typedef struct \{[^}]*\} tq_voice;$", PLAYER.read_text("utf-8"), re.MULTILINE
     )
@@ -143,7 +143,7 @@ def live_binding() -> FFI:
         SERVO,
     )
     builder.set_source(
-        "rig.live._live",
+        "tactileq.rig.live._live",
         f'#include "{SOUND.name}"\n#include "{SERVO.name}"',
         include_dirs=[str(PLAYER.parent), str(SOUND.parent), str(SERVO.parent)],
         depends=[str(header) for header in headers],
@@ -155,14 +155,14 @@ def live_binding() -> FFI:
 
 
 def standin_binding() -> FFI:
-    """The builder of `rig.force._standin`: Force Dimension's functions without a device.
+    """The builder of `tactileq.rig.force._standin`: Force Dimension's functions without a device.
 
     It is loaded as the maker's is, and its further functions say what the device does and suffers.
     """
     builder = FFI()
     builder.cdef(declarations(STANDIN))
     builder.set_source(
-        "rig.force._standin",
+        "tactileq.rig.force._standin",
         f'#include "{STANDIN.name}"',
         include_dirs=[str(STANDIN.parent), str(LIVE.parent)],
         depends=[str(STANDIN), str(LIVE), str(CLOCK)],
@@ -188,7 +188,7 @@ def virtual_board() -> str:
 
 
 def device_binding() -> FFI:
-    """The builder of `rig.device._device`: the firmware on a simulated board."""
+    """The builder of `tactileq.rig.device._device`: the firmware on a simulated board."""
     header = DEVICE / "virtual.h"
     builder = FFI()
     numbers = "typedef double tq_number;\n#define TQ_MOTORS 2"
@@ -196,7 +196,7 @@ def device_binding() -> FFI:
     builder.cdef("\n".join((numbers, *mechanics, virtual_board())))
     folders = [DEVICE, FORCE.parent, KERNEL.parent, LIVE.parent]
     builder.set_source(
-        "rig.device._device",
+        "tactileq.rig.device._device",
         f'#include "{header.name}"',
         include_dirs=[str(folder) for folder in folders],
         depends=headers_in(folders),
@@ -208,7 +208,7 @@ def device_binding() -> FFI:
 
 
 def recorder_binding() -> FFI:
-    """The builder of `rig.recorder._recorder`: the recorder's law on simulated mechanics."""
+    """The builder of `tactileq.rig.recorder._recorder`: the recorder's law on simulated mechanics."""
     headers = [OBSERVER, *(RECORDER / f"{name}.h" for name in ("control", "plant"))]
     folders = [RECORDER, DEVICE, FORCE.parent, LIVE.parent]
     builder = FFI()
@@ -225,7 +225,7 @@ def recorder_binding() -> FFI:
         )
     )
     builder.set_source(
-        "rig.recorder._recorder",
+        "tactileq.rig.recorder._recorder",
         '#include "board.h"',
         include_dirs=[str(folder) for folder in folders],
         depends=headers_in(folders),

@@ -17,21 +17,21 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from experiments.sessions import bids_events, bids_people, bids_physio, traces  # noqa: E402
-from experiments.tasks import threshold_table  # noqa: E402
-from modeling.files import answer_tables, stimulus_table  # noqa: E402
-from modeling.files.columns import markdown  # noqa: E402
-from modeling.files.describing import key_tables, schema_text  # noqa: E402
-from modeling.perception import thresholds  # noqa: E402
-from modeling.recordings import recording_set, trajectory  # noqa: E402
-from modeling.scenes import microcontrollers  # noqa: E402
-from rig.capture import pieces  # noqa: E402
-from rig.device.definition import DEVICE  # noqa: E402
-from rig.hand import scripted  # noqa: E402
-from rig.importing import labels  # noqa: E402
-from rig.recorder import store as recorder_store  # noqa: E402
-from rig.recorder.definition import RECORDER  # noqa: E402
-from rig.wire import generating  # noqa: E402
+from tactileq.experiments.sessions import bids_events, bids_people, bids_physio, traces  # noqa: E402
+from tactileq.experiments.tasks import threshold_table  # noqa: E402
+from tactileq.modeling.files import answer_tables, stimulus_table  # noqa: E402
+from tactileq.modeling.files.columns import markdown  # noqa: E402
+from tactileq.modeling.files.describing import key_tables, schema_text  # noqa: E402
+from tactileq.modeling.perception import thresholds  # noqa: E402
+from tactileq.modeling.recordings import recording_set, trajectory  # noqa: E402
+from tactileq.modeling.scenes import microcontrollers  # noqa: E402
+from tactileq.rig.capture import pieces  # noqa: E402
+from tactileq.rig.device.definition import DEVICE  # noqa: E402
+from tactileq.rig.hand import scripted  # noqa: E402
+from tactileq.rig.importing import labels  # noqa: E402
+from tactileq.rig.recorder import store as recorder_store  # noqa: E402
+from tactileq.rig.recorder.definition import RECORDER  # noqa: E402
+from tactileq.rig.wire import generating  # noqa: E402
 from tactileq.commands.schema import declared  # noqa: E402
 
 TABLES = {

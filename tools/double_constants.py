@@ -16,10 +16,10 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from benches.chart.judging import judge
-from benches.chart.surfaces import Origin
-from modeling.estimation import coherent
-from modeling.fitting import field, growth, joint_grid, layer_search
+from tactileq.benches.chart.judging import judge
+from tactileq.benches.chart.surfaces import Origin
+from tactileq.modeling.estimation import coherent
+from tactileq.modeling.fitting import field, growth, joint_grid, layer_search
 
 SURFACES = range(3000, 3011)
 CONSTANTS = {

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis.answers.order import (
+from tactileq.analysis.answers.order import (
     Planned,
 )
-from modeling import InputError
+from tactileq.modeling import InputError
 
 # Times to the millisecond: two participants do not have so many equal ones by chance.
 FEWEST_TIMES = 3

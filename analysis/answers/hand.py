@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.columns import MODEL, TEXTURE
-from modeling import InputError
-from modeling.errors import shown
-from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.columns import Column, names
-from modeling.files.documents import read_json_object
-from modeling.files.reading import read_bytes
+from tactileq.analysis.columns import MODEL, TEXTURE
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.files.columns import Column, names
+from tactileq.modeling.files.documents import read_json_object
+from tactileq.modeling.files.reading import read_bytes
 
 HAND_MEASURES = ("speed_mm_s", "force_n", "contact_s", "presentations")
 HAND_TABLE_COLUMNS = (

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from modeling import InputError
-from modeling.errors import shortened, shown
-from modeling.files.reading import read_text
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shortened, shown
+from tactileq.modeling.files.reading import read_text
 
 ROLES = ("participant", "presented", "answered", "correct", "share", "value", "count")
 # Names of columns of the tables that follow from these.

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis.answers.gathering import Gathered
-from analysis.answers.order import (
+from tactileq.analysis.answers.gathering import Gathered
+from tactileq.analysis.answers.order import (
     Planned,
     check_manifest,
     check_order,
@@ -16,9 +16,9 @@ from analysis.answers.order import (
     planned_trials,
     unordered_warnings,
 )
-from analysis.answers.plan import AnalysisPlan, plan_from
-from analysis.answers.responses import PlannedTask, Responses, stands_apart
-from analysis.answers.tables import (
+from tactileq.analysis.answers.plan import AnalysisPlan, plan_from
+from tactileq.analysis.answers.responses import PlannedTask, Responses, stands_apart
+from tactileq.analysis.answers.tables import (
     MAY_DIFFER,
     check_known,
     check_session,
@@ -28,16 +28,16 @@ from analysis.answers.tables import (
     read_answers_table,
     valid_trials,
 )
-from analysis.labels import MODELS
-from modeling import InputError
-from modeling.errors import shown
-from modeling.files.answer_tables import (
+from tactileq.analysis.labels import MODELS
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.answer_tables import (
     ANSWER_TABLES,
     PARTICIPANT_COLUMNS,
     PARTICIPANT_ID,
 )
-from modeling.files.columns import shortened_hash
-from modeling.files.hashes import sha256_of_values
+from tactileq.modeling.files.columns import shortened_hash
+from tactileq.modeling.files.hashes import sha256_of_values
 
 _SIMULATED = ("Simulated", "SimulatedParticipant", "SimulatedRig")
 

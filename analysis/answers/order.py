@@ -8,10 +8,10 @@ from typing import Any
 
 import pandas as pd
 
-from modeling import InputError
-from modeling.files.columns import shortened_hash
-from modeling.files.hashes import sha256_of
-from modeling.files.reading import read_text
+from tactileq.modeling import InputError
+from tactileq.modeling.files.columns import shortened_hash
+from tactileq.modeling.files.hashes import sha256_of
+from tactileq.modeling.files.reading import read_text
 
 Planned = Mapping[str, Any]
 

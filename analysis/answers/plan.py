@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from modeling.files.claims import FEW, PlanSection
-from modeling.files.described import naming
+from tactileq.modeling.files.claims import FEW, PlanSection
+from tactileq.modeling.files.described import naming
 
 EQUIVALENCE, DIFFERENCE = "equivalence", "difference"
 MODEL_RULE, TESTS_RULE = "model", "tests"

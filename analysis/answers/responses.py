@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 
 import pandas as pd
 
-from analysis.answers.plan import AnalysisPlan
-from analysis.labels import MODELS
-from modeling.errors import InputError, shown
-from modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.analysis.answers.plan import AnalysisPlan
+from tactileq.analysis.labels import MODELS
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
 
 SETUP_SEPARATOR = "/"  # a set-up's name and a participant's: leipzig/sub-01
 
@@ -45,7 +45,7 @@ class Responses:
     Parameters
     ----------
     answers : mapping of task to DataFrame
-        Main trials of each task that `modeling.files.answer_tables` declares, one row each:
+        Main trials of each task that `tactileq.modeling.files.answer_tables` declares, one row each:
         participant_id, session, and the task's columns (numbers NaN where not answered).
     simulated_participants : bool
         True where no person took part.

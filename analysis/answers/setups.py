@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pandas as pd
 
-from analysis.answers.responses import SETUP_SEPARATOR, Responses
-from modeling import InputError
-from modeling.errors import shown
+from tactileq.analysis.answers.responses import SETUP_SEPARATOR, Responses
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
 
 
 def pool_setups(setups: Mapping[str, Responses]) -> Responses:

@@ -12,16 +12,16 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.answers.gathering import Gathered
-from modeling import InputError
-from modeling.errors import shown
-from modeling.files.answer_tables import (
+from tactileq.analysis.answers.gathering import Gathered
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.answer_tables import (
     ANSWER_TABLES,
     AnswerColumn,
 )
-from modeling.files.columns import Column, names
-from modeling.files.documents import read_json_object
-from modeling.files.tables import read_table
+from tactileq.modeling.files.columns import Column, names
+from tactileq.modeling.files.documents import read_json_object
+from tactileq.modeling.files.tables import read_table
 
 _RESTS_ON = ("StudySHA256", "ModelsSHA256")
 # In what a session may differ if its manifest records the reason, and under which word.

@@ -13,15 +13,15 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 
-from analysis.answers.responses import Responses
-from analysis.labels import MODELS, TASK_TITLES, sentence_case
-from analysis.page.sections import Section
-from analysis.statistics.verdicts import ClaimFound
-from analysis.textures.results import TextureResult
-from modeling.errors import counted
-from modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
-from modeling.files.writing import file_stem
-from modeling.seeds import generator, number_of
+from tactileq.analysis.answers.responses import Responses
+from tactileq.analysis.labels import MODELS, TASK_TITLES, sentence_case
+from tactileq.analysis.page.sections import Section
+from tactileq.analysis.statistics.verdicts import ClaimFound
+from tactileq.analysis.textures.results import TextureResult
+from tactileq.modeling.errors import counted
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
+from tactileq.modeling.files.writing import file_stem
+from tactileq.modeling.seeds import generator, number_of
 
 NOBODY_ASKED = "No participant was tested: this report contains models and no answers."
 LEAD = "Surfaces recorded, modelled, simplified by detection thresholds, and judged."
@@ -41,7 +41,7 @@ class Answered:
     seed : int
         Of the report.
     hand : DataFrame, optional
-        How the hand moved with either model (`analysis.answers.hand.load_hand`).
+        How the hand moved with either model (`tactileq.analysis.answers.hand.load_hand`).
     planted : mapping of texture to mapping of measure to points, optional
         Differences that simulated participants were given (`verdicts.planted_verdicts`).
     """
@@ -148,9 +148,9 @@ class Modelled:
     textures : sequence of TextureResult
         At least one.
     gfc : DataFrame
-        `analysis.textures.likeness.gfc_table` of all of them.
+        `tactileq.analysis.textures.likeness.gfc_table` of all of them.
     driving : DataFrame
-        `analysis.textures.regressions.driving_table` of all of them.
+        `tactileq.analysis.textures.regressions.driving_table` of all of them.
     """
 
     textures: Sequence[TextureResult]

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from scipy import stats
 
-from analysis.labels import ALL_TEXTURES, IDENTICAL, significance_mark
-from analysis.page.drawing import (
+from tactileq.analysis.labels import ALL_TEXTURES, IDENTICAL, significance_mark
+from tactileq.analysis.page.drawing import (
     BLACK,
     BLUE,
     GREY,
@@ -16,9 +16,9 @@ from analysis.page.drawing import (
     finish_axes,
     stamp_if_simulated,
 )
-from analysis.statistics.paired import CONFIDENCE, ignoring_case
-from analysis.statistics.verdicts import ClaimFound
-from modeling.arrays import Floats
+from tactileq.analysis.statistics.paired import CONFIDENCE, ignoring_case
+from tactileq.analysis.statistics.verdicts import ClaimFound
+from tactileq.modeling.arrays import Floats
 
 ROLES = ("reference", "other")
 ROLE_COLOURS = {"reference": BLUE, "other": ORANGE}

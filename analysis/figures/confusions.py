@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from analysis.page.drawing import GREY, axes_or_new, stamp_if_simulated
-from analysis.statistics.confusion import ConfusionMatrix
+from tactileq.analysis.page.drawing import GREY, axes_or_new, stamp_if_simulated
+from tactileq.analysis.statistics.confusion import ConfusionMatrix
 
 SMALL_TEXT, TEXT = 7, 9
 MANY = 9  # classes above which the text in cells is smaller

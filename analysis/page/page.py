@@ -10,7 +10,7 @@ from html import escape
 import pandas as pd
 from matplotlib.figure import Figure
 
-from modeling.files.columns import Column, Columns, names
+from tactileq.modeling.files.columns import Column, Columns, names
 
 PICTURE_DPI = 150
 PIXELS_PER_INCH = 92

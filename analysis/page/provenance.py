@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from analysis.page.page import Table
-from modeling.files.columns import Column, names
+from tactileq.analysis.page.page import Table
+from tactileq.modeling.files.columns import Column, names
 
 PROVENANCE_COLUMNS = (Column("what"), Column("value", is_hash=True))
 

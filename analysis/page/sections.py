@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol, TypeVar
 
-from analysis.page.outcomes import Outcome
-from analysis.page.page import Fold, Item, Picture, Table
-from modeling.files.writing import file_stem
+from tactileq.analysis.page.outcomes import Outcome
+from tactileq.analysis.page.page import Fold, Item, Picture, Table
+from tactileq.modeling.files.writing import file_stem
 
 Progress = Callable[[float, str], None]
 Wanted = TypeVar("Wanted")

@@ -11,8 +11,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.labels import ALL_TEXTURES
-from analysis.page.drawing import (
+from tactileq.analysis.labels import ALL_TEXTURES
+from tactileq.analysis.page.drawing import (
     BLACK,
     BLUE,
     GREEN,
@@ -25,9 +25,9 @@ from analysis.page.drawing import (
     finish_axes,
     stamp_if_simulated,
 )
-from analysis.power.power import EVERY_TEXTURE, MEAN_ALONE, NO_VERDICT, TARGET
-from analysis.statistics.caveats import BOUNDS_WITHHELD, WITHHELD
-from analysis.statistics.equivalence import (
+from tactileq.analysis.power.power import EVERY_TEXTURE, MEAN_ALONE, NO_VERDICT, TARGET
+from tactileq.analysis.statistics.caveats import BOUNDS_WITHHELD, WITHHELD
+from tactileq.analysis.statistics.equivalence import (
     ALL_BUT,
     AVERAGE_FELT,
     DIFFERENT,
@@ -68,7 +68,7 @@ def figure_power(table: pd.DataFrame) -> Figure:
     Parameters
     ----------
     table : DataFrame
-        From `analysis.power.power.power_table`.
+        From `tactileq.analysis.power.power.power_table`.
     """
     claims = list(table["claim"].drop_duplicates())
     across = min(len(claims), PANELS_IN_A_ROW)

@@ -12,15 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from analysis.answers.plan import EQUIVALENCE, Claim
-from analysis.answers.responses import Responses
-from analysis.columns import TEXTURE
-from analysis.labels import ALL_TEXTURES
-from analysis.statistics.caveats import BOUNDS_WITHHELD, WITHHELD, Caveats
-from analysis.statistics.claims import Values, every_equivalent, words_of_people
-from analysis.statistics.compared_answers import claim_shares, claim_values
-from analysis.statistics.draws import generators
-from analysis.statistics.equivalence import (
+from tactileq.analysis.answers.plan import EQUIVALENCE, Claim
+from tactileq.analysis.answers.responses import Responses
+from tactileq.analysis.columns import TEXTURE
+from tactileq.analysis.labels import ALL_TEXTURES
+from tactileq.analysis.statistics.caveats import BOUNDS_WITHHELD, WITHHELD, Caveats
+from tactileq.analysis.statistics.claims import Values, every_equivalent, words_of_people
+from tactileq.analysis.statistics.compared_answers import claim_shares, claim_values
+from tactileq.analysis.statistics.draws import generators
+from tactileq.analysis.statistics.equivalence import (
     ALL_BUT,
     AVERAGE_FELT,
     DIFFERENT,
@@ -32,20 +32,20 @@ from analysis.statistics.equivalence import (
     Bounds,
     equivalence_test,
 )
-from analysis.statistics.paired import (
+from tactileq.analysis.statistics.paired import (
     holm,
     sign_flips_p,
     t_test,
     why_undefined,
     without_rounding_noise,
 )
-from analysis.statistics.participants.design import PeopleData
-from analysis.statistics.participants.posterior import Effort
-from analysis.statistics.participants.verdict import PeopleJudged, judged_by_size
-from analysis.statistics.rates import clopper_pearson
-from analysis.statistics.verdicts import claim_caveats, people_data
-from modeling.arrays import Floats
-from modeling.files.columns import Column, names
+from tactileq.analysis.statistics.participants.design import PeopleData
+from tactileq.analysis.statistics.participants.posterior import Effort
+from tactileq.analysis.statistics.participants.verdict import PeopleJudged, judged_by_size
+from tactileq.analysis.statistics.rates import clopper_pearson
+from tactileq.analysis.statistics.verdicts import claim_caveats, people_data
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.files.columns import Column, names
 
 TARGET = 0.8  # usual power to plan for
 EVERY_TEXTURE = "every texture"

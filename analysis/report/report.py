@@ -12,17 +12,17 @@ from typing import cast
 import numpy as np
 import pandas as pd
 
-from analysis.answers.responses import Responses
-from analysis.chapters.chapter import (
+from tactileq.analysis.answers.responses import Responses
+from tactileq.analysis.chapters.chapter import (
     AnswerChapter,
     Answered,
     ModelChapter,
     Modelled,
     StudyChapter,
 )
-from analysis.columns import tsv_text
-from analysis.labels import MODELS
-from analysis.page.page import (
+from tactileq.analysis.columns import tsv_text
+from tactileq.analysis.labels import MODELS
+from tactileq.analysis.page.page import (
     PICTURE_DPI,
     Fold,
     Item,
@@ -38,16 +38,16 @@ from analysis.page.page import (
     table_html,
     tiles,
 )
-from analysis.page.provenance import provenance_table
-from analysis.page.saving import missing_fonts, png_of, svg_of
-from analysis.page.sections import Headline, Mapped, Progress, Section
-from analysis.statistics.verdicts import ClaimsBegun
-from analysis.textures.compared import Comparison, comparisons
-from analysis.textures.regressions import driving_table
-from analysis.textures.results import TextureResult
-from modeling import InputError
-from modeling.errors import counted
-from modeling.files.writing import write_text
+from tactileq.analysis.page.provenance import provenance_table
+from tactileq.analysis.page.saving import missing_fonts, png_of, svg_of
+from tactileq.analysis.page.sections import Headline, Mapped, Progress, Section
+from tactileq.analysis.statistics.verdicts import ClaimsBegun
+from tactileq.analysis.textures.compared import Comparison, comparisons
+from tactileq.analysis.textures.regressions import driving_table
+from tactileq.analysis.textures.results import TextureResult
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import counted
+from tactileq.modeling.files.writing import write_text
 
 # The chapters in the order of the page: folders of `analysis/chapters`. The generator of a report
 # is passed on from each chapter to the next, so a new one goes to the end of its list.
@@ -109,7 +109,7 @@ def write_report(
     provenance : mapping of str to object, optional
         Versions, configuration, hashes of inputs; nested values are flattened.
     hand : DataFrame, optional
-        How the hand moved with either model (`analysis.answers.hand.load_hand`).
+        How the hand moved with either model (`tactileq.analysis.answers.hand.load_hand`).
     planted : mapping of texture to mapping of measure to points, optional
         Differences that simulated participants were given (`verdicts.planted_verdicts`).
     seed : int
@@ -238,7 +238,7 @@ def _write_pages(
 
 def _sections_of(name: str) -> object:
     """The function `sections` of a chapter."""
-    return import_module(f"analysis.chapters.{name}.section").sections
+    return import_module(f"tactileq.analysis.chapters.{name}.section").sections
 
 
 @dataclass(frozen=True)

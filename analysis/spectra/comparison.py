@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.textures.results import TextureResult
-from modeling import (
+from tactileq.analysis.textures.results import TextureResult
+from tactileq.modeling import (
     PEQ,
     InputError,
     Recording,
@@ -20,15 +20,15 @@ from modeling import (
     Threshold,
     find_layers,
 )
-from modeling.arrays import Bools, Floats
-from modeling.equalizer.bands import band_response
-from modeling.errors import shown
-from modeling.models.own_peaks import own_peaks
-from modeling.perception.amplitudes import layer_amplitudes_g
-from modeling.perception.by_power import power_changes
-from modeling.perception.signs_of_rest import SignsOfRest
-from modeling.perception.verdicts import CriterionName
-from modeling.recordings.spectrum import (
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.equalizer.bands import band_response
+from tactileq.modeling.errors import shown
+from tactileq.modeling.models.own_peaks import own_peaks
+from tactileq.modeling.perception.amplitudes import layer_amplitudes_g
+from tactileq.modeling.perception.by_power import power_changes
+from tactileq.modeling.perception.signs_of_rest import SignsOfRest
+from tactileq.modeling.perception.verdicts import CriterionName
+from tactileq.modeling.recordings.spectrum import (
     SMOOTHING_HZ,
     high_pass_response,
     mean_spectrum,

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from modeling.arrays import Bools, Floats
-from modeling.files.folders import listed_file
-from modeling.files.stimulus_table import MANIFEST, STIMULUS_COLUMNS
-from modeling.files.tables import read_table
-from stimuli.sets.manifest import COMPENSATED
-from stimuli.sets.recipe import Recipe
-from stimuli.sets.rendering import steady_part
-from stimuli.sets.sources import RECIPE
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.files.folders import listed_file
+from tactileq.modeling.files.stimulus_table import MANIFEST, STIMULUS_COLUMNS
+from tactileq.modeling.files.tables import read_table
+from tactileq.stimuli.sets.manifest import COMPENSATED
+from tactileq.stimuli.sets.recipe import Recipe
+from tactileq.stimuli.sets.rendering import steady_part
+from tactileq.stimuli.sets.sources import RECIPE
 
 LINE_HZ = 10.0
 _NAMES = ("texture", "trajectory", "model")
@@ -64,7 +64,7 @@ def contact_sheet(folder: str | Path) -> ContactSheet:
     Parameters
     ----------
     folder : path
-        A set that `stimuli.sets.writing.write_set` has written.
+        A set that `tactileq.stimuli.sets.writing.write_set` has written.
     """
     place = Path(folder)
     manifest = pd.DataFrame(read_table(place / MANIFEST, STIMULUS_COLUMNS))

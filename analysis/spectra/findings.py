@@ -7,23 +7,23 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from analysis.columns import table_bytes
-from analysis.textures.between import (
+from tactileq.analysis.columns import table_bytes
+from tactileq.analysis.textures.between import (
     distances_to_recordings,
     field_fit,
     fit_like,
     left_out_table,
 )
-from analysis.textures.recordings import (
+from tactileq.analysis.textures.recordings import (
     RecordingLayers,
     layers_of_recordings,
     layers_table,
     model_layers_table,
     spectra_table,
 )
-from modeling import GridError, Recording, RecordingSet, Spectrum, TextureModel
-from modeling.fitting.conditions import only_unit, recording_spectra
-from modeling.fitting.texture import fit_spectra
+from tactileq.modeling import GridError, Recording, RecordingSet, Spectrum, TextureModel
+from tactileq.modeling.fitting.conditions import only_unit, recording_spectra
+from tactileq.modeling.fitting.texture import fit_spectra
 
 # Endings of the files with the findings from one texture's recordings.
 FILE_ENDINGS = (
@@ -87,9 +87,9 @@ def find_in(
     records : RecordingSet
         Of one texture.
     estimator, layers
-        As in `modeling.fit_texture`.
+        As in `tactileq.modeling.fit_texture`.
     keep_hum : bool
-        As in `modeling.fitting.conditions.recording_spectra`.
+        As in `tactileq.modeling.fitting.conditions.recording_spectra`.
     check : bool
         Also leave conditions out and predict them.
     alone : bool
@@ -98,7 +98,7 @@ def find_in(
     Raises
     ------
     InputError
-        For records that cannot be used, as in `modeling.fit_texture`.
+        For records that cannot be used, as in `tactileq.modeling.fit_texture`.
     """
     only_unit(records)
     measured = recording_spectra(records, keep_hum=keep_hum)
@@ -146,11 +146,11 @@ def findings_files(found: Findings, *, plot: bool) -> dict[str, bytes]:
 
 def _pictures(found: Findings) -> dict[str, bytes]:
     # Late: without pictures there is nothing to load Matplotlib for.
-    from analysis.page.saving import picture_bytes
-    from analysis.spectra.comparison import spectrum_panels
-    from analysis.spectra.figures.layers_over_grid import figure_layers_over_grid
-    from analysis.spectra.figures.spectra import figure_spectra
-    from analysis.spectra.layers_over_grid import layers_over_grid
+    from tactileq.analysis.page.saving import picture_bytes
+    from tactileq.analysis.spectra.comparison import spectrum_panels
+    from tactileq.analysis.spectra.figures.layers_over_grid import figure_layers_over_grid
+    from tactileq.analysis.spectra.figures.spectra import figure_spectra
+    from tactileq.analysis.spectra.layers_over_grid import layers_over_grid
 
     panels = spectrum_panels(found.measured, estimator=found.estimator, model=found.model)
     pictures = {"_spectra.png": picture_bytes(figure_spectra(panels))}

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modeling import InputError, TextureModel
-from modeling.arrays import Bools, Floats
-from modeling.errors import shown
-from modeling.perception.amplitudes import layer_amplitudes_g
+from tactileq.modeling import InputError, TextureModel
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.errors import shown
+from tactileq.modeling.perception.amplitudes import layer_amplitudes_g
 
 
 def _grid_index(model: TextureModel, speed_mm_s: float, *, force_n: float) -> tuple[int, int]:

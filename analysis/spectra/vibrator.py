@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.vibrators.compensation import (
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.vibrators.compensation import (
     FLAT_WITHIN_DB,
     Compensation,
     compensation_for,
     flat_band,
 )
-from modeling.vibrators.identification import LEAST_COHERENCE
-from modeling.vibrators.vibrator import Vibrator
+from tactileq.modeling.vibrators.identification import LEAST_COHERENCE
+from tactileq.modeling.vibrators.vibrator import Vibrator
 
 MISTUNINGS = (-0.1, 0.1)
 

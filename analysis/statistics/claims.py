@@ -11,11 +11,11 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 import pandas as pd
 
-from analysis.answers.plan import MODEL_RULE, TESTS_RULE, Claim
-from analysis.columns import TEXTURE, P
-from analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES
-from analysis.statistics.caveats import Caveats
-from analysis.statistics.equivalence import (
+from tactileq.analysis.answers.plan import MODEL_RULE, TESTS_RULE, Claim
+from tactileq.analysis.columns import TEXTURE, P
+from tactileq.analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES
+from tactileq.analysis.statistics.caveats import Caveats
+from tactileq.analysis.statistics.equivalence import (
     ALPHA,
     EQUAL_ON_AVERAGE,
     EQUIVALENT,
@@ -25,7 +25,7 @@ from analysis.statistics.equivalence import (
     equivalence_test,
     verdict,
 )
-from analysis.statistics.paired import (
+from tactileq.analysis.statistics.paired import (
     holm,
     ignoring_case,
     paired_test,
@@ -34,9 +34,9 @@ from analysis.statistics.paired import (
     why_undefined,
     without_rounding_noise,
 )
-from analysis.statistics.participants.verdict import PeopleFound, PeopleJudged
-from modeling.arrays import Floats
-from modeling.files.columns import Column, chosen, names
+from tactileq.analysis.statistics.participants.verdict import PeopleFound, PeopleJudged
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.files.columns import Column, chosen, names
 
 CONTROL = "control"
 NO_TEST = "no test"  # of answers that are incomplete

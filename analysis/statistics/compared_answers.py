@@ -10,17 +10,17 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from analysis.answers.plan import DIFFERENCE, Claim
-from analysis.answers.responses import Responses
-from analysis.labels import MEASURES, MODELS, SCALES, TASK_TITLES
-from analysis.statistics.claims import (
+from tactileq.analysis.answers.plan import DIFFERENCE, Claim
+from tactileq.analysis.answers.responses import Responses
+from tactileq.analysis.labels import MEASURES, MODELS, SCALES, TASK_TITLES
+from tactileq.analysis.statistics.claims import (
     Values,
     complete_means,
     share_at_ends,
 )
-from modeling import InputError
-from modeling.files.answer_tables import ANSWER_TABLES, ENDS, AnswerTable
-from modeling.participants.choices import (
+from tactileq.modeling import InputError
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES, ENDS, AnswerTable
+from tactileq.modeling.participants.choices import (
     ODDITY,
     DecisionModel,
     forced_choice,

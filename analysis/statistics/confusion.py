@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.labels import MODELS
-from modeling.arrays import Floats
-from modeling.files.columns import Column
+from tactileq.analysis.labels import MODELS
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.files.columns import Column
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,23 +7,23 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from analysis.answers.responses import Responses, setup_of
-from analysis.columns import TEXTURE
-from analysis.labels import TASK_TITLES
-from analysis.statistics.caveats import DIFFERENCES, EQUALITY, Caveats
-from analysis.statistics.claims import CONTROL
-from analysis.statistics.compared_answers import (
+from tactileq.analysis.answers.responses import Responses, setup_of
+from tactileq.analysis.columns import TEXTURE
+from tactileq.analysis.labels import TASK_TITLES
+from tactileq.analysis.statistics.caveats import DIFFERENCES, EQUALITY, Caveats
+from tactileq.analysis.statistics.claims import CONTROL
+from tactileq.analysis.statistics.compared_answers import (
     all_claims,
     claim_values,
 )
-from analysis.statistics.paired import (
+from tactileq.analysis.statistics.paired import (
     t_test,
     why_undefined,
     without_rounding_noise,
 )
-from analysis.statistics.verdicts import ClaimFound
-from modeling import InputError
-from modeling.files.columns import Column, names
+from tactileq.analysis.statistics.verdicts import ClaimFound
+from tactileq.modeling import InputError
+from tactileq.modeling.files.columns import Column, names
 
 SETUP_COLUMNS = (
     Column("claim", is_name=True),

@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.statistics.paired import participant_means
-from modeling.arrays import Floats
-from modeling.errors import counted
+from tactileq.analysis.statistics.paired import participant_means
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import counted
 
 MODEL_EFFECT, SESSION, ORDER = (
     "model, other to reference",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.seeds import generator
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.seeds import generator
 
 
 def generators(rng: np.random.Generator) -> dict[str, np.random.Generator]:

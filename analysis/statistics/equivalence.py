@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from analysis.statistics.paired import sign_flips_p, t_tests, why_undefined, without_rounding_noise
-from modeling import InputError
-from modeling.arrays import Floats
+from tactileq.analysis.statistics.paired import sign_flips_p, t_tests, why_undefined, without_rounding_noise
+from tactileq.modeling import InputError
+from tactileq.modeling.arrays import Floats
 
 ALPHA = 0.05
 EQUIVALENT = "equivalent"

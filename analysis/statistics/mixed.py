@@ -14,11 +14,11 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
-from analysis.columns import P
-from analysis.statistics.design import MODEL_EFFECT, complete_participants, design
-from analysis.statistics.paired import CONFIDENCE, paired_test
-from modeling.arrays import Floats
-from modeling.files.columns import Column, names
+from tactileq.analysis.columns import P
+from tactileq.analysis.statistics.design import MODEL_EFFECT, complete_participants, design
+from tactileq.analysis.statistics.paired import CONFIDENCE, paired_test
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.files.columns import Column, names
 
 MOST_SIMPLEX_STEPS = 1000
 LEAST_VARIANCE = 0.01  # of the noise's: where the search begins
@@ -164,7 +164,7 @@ def mixed_effects(
     Parameters
     ----------
     answers : DataFrame
-        As in `analysis.statistics.design.design`, textures with identical models left out.
+        As in `tactileq.analysis.statistics.design.design`, textures with identical models left out.
     models : (str, str)
         The reference, and the other one.
     rng : Generator

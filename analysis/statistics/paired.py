@@ -10,9 +10,9 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from scipy import special, stats
 
-from modeling import InputError
-from modeling.arrays import Floats
-from modeling.errors import counted
+from tactileq.modeling import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import counted
 
 CONFIDENCE = 0.95
 RESAMPLES = 9999  # of sign flips; all of them where there are fewer, that is up to 13 participants

@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.columns import MODEL, TEXTURE, P
-from analysis.labels import ALL_TEXTURES
-from analysis.statistics.paired import (
+from tactileq.analysis.columns import MODEL, TEXTURE, P
+from tactileq.analysis.labels import ALL_TEXTURES
+from tactileq.analysis.statistics.paired import (
     CONFIDENCE,
     holm,
     ignoring_case,
@@ -22,9 +22,9 @@ from analysis.statistics.paired import (
     why_undefined,
     without_rounding_noise,
 )
-from modeling import InputError
-from modeling.arrays import Floats
-from modeling.files.columns import Column, names
+from tactileq.modeling import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.files.columns import Column, names
 
 BOOTSTRAP_RESAMPLES = 5000
 UNKNOWN_CHANCE = "chance not declared"

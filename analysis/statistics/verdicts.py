@@ -14,36 +14,36 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.answers.plan import MODEL_RULE, AnalysisPlan, Claim
-from analysis.answers.responses import Responses
-from analysis.labels import ALL_TEXTURES, SCALES
-from analysis.page.sections import Mapped
-from analysis.statistics.caveats import NOT_TESTED, SHOWN, Caveats
-from analysis.statistics.claims import claim_tests, with_people
-from analysis.statistics.compared_answers import (
+from tactileq.analysis.answers.plan import MODEL_RULE, AnalysisPlan, Claim
+from tactileq.analysis.answers.responses import Responses
+from tactileq.analysis.labels import ALL_TEXTURES, SCALES
+from tactileq.analysis.page.sections import Mapped
+from tactileq.analysis.statistics.caveats import NOT_TESTED, SHOWN, Caveats
+from tactileq.analysis.statistics.claims import claim_tests, with_people
+from tactileq.analysis.statistics.compared_answers import (
     all_claims,
     answers_about,
     chance_of,
     claim_values,
     decision_model,
 )
-from analysis.statistics.draws import generators
-from analysis.statistics.equivalence import ALPHA
-from analysis.statistics.paired import (
+from tactileq.analysis.statistics.draws import generators
+from tactileq.analysis.statistics.equivalence import ALPHA
+from tactileq.analysis.statistics.paired import (
     sign_flips_p,
     why_undefined,
     without_rounding_noise,
 )
-from analysis.statistics.participants.design import (
+from tactileq.analysis.statistics.participants.design import (
     PeopleData,
     choice_studies,
     rating_studies,
     textures_of,
 )
-from analysis.statistics.participants.verdict import FEWEST, PeopleFound, people_found
-from modeling.arrays import Floats
-from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.seeds import number_of
+from tactileq.analysis.statistics.participants.verdict import FEWEST, PeopleFound, people_found
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.seeds import number_of
 
 Row = Mapping[Hashable, Any]
 
@@ -55,7 +55,7 @@ class ClaimFound:
     Parameters
     ----------
     tests : DataFrame
-        `analysis.statistics.claims.claim_tests`; without rows where nobody answered.
+        `tactileq.analysis.statistics.claims.claim_tests`; without rows where nobody answered.
     values : DataFrame
         texture, participant_id, reference, other.
     people : PeopleFound, optional

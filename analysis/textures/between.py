@@ -14,20 +14,20 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from analysis.columns import CONDITIONS, ESTIMATOR, TEXTURE
-from analysis.textures.results import TextureResult
-from modeling import GridError, Recording, Spectrum, TextureModel, similarity
-from modeling.arrays import Floats
-from modeling.estimation.likelihood import is_silent
-from modeling.files.columns import Column
-from modeling.fitting.autoregressive import fit_ar_spectra
-from modeling.fitting.conditions import spectra_by_condition
-from modeling.fitting.spectral_field import fit_field_to_spectra
-from modeling.fitting.texture import fit_spectra
-from modeling.models.grid import Condition, grid_axes
-from modeling.recordings.spectrum import SMOOTHING_HZ, mean_spectrum, smooth
-from modeling.similarity import SpectralFilter
-from stimuli.planted.textures import PlantedSurface
+from tactileq.analysis.columns import CONDITIONS, ESTIMATOR, TEXTURE
+from tactileq.analysis.textures.results import TextureResult
+from tactileq.modeling import GridError, Recording, Spectrum, TextureModel, similarity
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.estimation.likelihood import is_silent
+from tactileq.modeling.files.columns import Column
+from tactileq.modeling.fitting.autoregressive import fit_ar_spectra
+from tactileq.modeling.fitting.conditions import spectra_by_condition
+from tactileq.modeling.fitting.spectral_field import fit_field_to_spectra
+from tactileq.modeling.fitting.texture import fit_spectra
+from tactileq.modeling.models.grid import Condition, grid_axes
+from tactileq.modeling.recordings.spectrum import SMOOTHING_HZ, mean_spectrum, smooth
+from tactileq.modeling.similarity import SpectralFilter
+from tactileq.stimuli.planted.textures import PlantedSurface
 
 Measured = Sequence[tuple[Recording, Spectrum]]
 # Of one condition: the filter that a model has there.
@@ -156,7 +156,7 @@ def left_out_table(measured: Measured, fit: Fit) -> pd.DataFrame:
     Parameters
     ----------
     measured : sequence of (Recording, Spectrum)
-        From `modeling.fitting.conditions.recording_spectra`.
+        From `tactileq.modeling.fitting.conditions.recording_spectra`.
     fit : callable
         Makes a model of some of them.
 

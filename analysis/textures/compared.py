@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from analysis.page.sections import Mapped
-from analysis.textures.likeness import condition_targets, gfc_table
-from analysis.textures.regressions import driven_table
-from analysis.textures.results import TextureResult
+from tactileq.analysis.page.sections import Mapped
+from tactileq.analysis.textures.likeness import condition_targets, gfc_table
+from tactileq.analysis.textures.regressions import driven_table
+from tactileq.analysis.textures.results import TextureResult
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from analysis.columns import CONDITIONS, MODEL, TEXTURE
-from modeling import InputError, RecordingSet, RegressedModel, TextureModel, similarity
-from modeling.files.columns import Column
-from modeling.fitting.conditions import recording_spectra
-from modeling.models.grid import Condition
+from tactileq.analysis.columns import CONDITIONS, MODEL, TEXTURE
+from tactileq.modeling import InputError, RecordingSet, RegressedModel, TextureModel, similarity
+from tactileq.modeling.files.columns import Column
+from tactileq.modeling.fitting.conditions import recording_spectra
+from tactileq.modeling.models.grid import Condition
 
 MEASURE_COLUMNS = (
     Column("gfc30_mean", "GFC30 mean", format=".4f"),

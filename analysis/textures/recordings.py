@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from modeling import Layers, Recording, Spectrum, TextureModel, find_layers
-from modeling.models.own_peaks import own_peaks
+from tactileq.modeling import Layers, Recording, Spectrum, TextureModel, find_layers
+from tactileq.modeling.models.own_peaks import own_peaks
 
 SPECTRUM_STEP_HZ = 5.0
 
@@ -32,9 +32,9 @@ def layers_of_recordings(
     Parameters
     ----------
     measured : sequence of (Recording, Spectrum)
-        From `modeling.fitting.conditions.recording_spectra`.
+        From `tactileq.modeling.fitting.conditions.recording_spectra`.
     estimator : str
-        As in `modeling.fit_texture`.
+        As in `tactileq.modeling.fit_texture`.
     """
     return tuple(
         RecordingLayers(recording, found, find_layers(found, estimator=estimator))

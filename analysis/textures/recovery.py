@@ -10,13 +10,13 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment, minimize_scalar
 
-from analysis.columns import ESTIMATOR, LAYER, TEXTURE
-from analysis.labels import ALL_LAYERS
-from modeling import InputError, TextureModel, similarity
-from modeling.arrays import Bools, Floats, Integers
-from modeling.equalizer.peq import PEQ
-from modeling.errors import shown
-from modeling.files.columns import Column, names
+from tactileq.analysis.columns import ESTIMATOR, LAYER, TEXTURE
+from tactileq.analysis.labels import ALL_LAYERS
+from tactileq.modeling import InputError, TextureModel, similarity
+from tactileq.modeling.arrays import Bools, Floats, Integers
+from tactileq.modeling.equalizer.peq import PEQ
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.columns import Column, names
 
 GRID_STEP_HZ = 5.0  # where a truth and its form at a lower rate are compared
 LEAST_TOLERANCE_HZ = 10.0

@@ -8,22 +8,22 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from analysis.columns import CONDITIONS, SIMULATED_COLUMN, TEXTURE, P
-from analysis.labels import ALL_TEXTURES, significance_mark
-from analysis.textures.likeness import MEASURE_COLUMNS, ConditionTarget, likeness_table
-from modeling import RegressedModel, TextureModel, regressed
-from modeling.arrays import Floats
-from modeling.files.columns import Column
-from modeling.models.own_peaks import own_peaks
-from modeling.models.terms import FORCE, SPEED, SPEED_FORCE, TERMS, DrivenBy
-from modeling.regression.centroid import (
+from tactileq.analysis.columns import CONDITIONS, SIMULATED_COLUMN, TEXTURE, P
+from tactileq.analysis.labels import ALL_TEXTURES, significance_mark
+from tactileq.analysis.textures.likeness import MEASURE_COLUMNS, ConditionTarget, likeness_table
+from tactileq.modeling import RegressedModel, TextureModel, regressed
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.files.columns import Column
+from tactileq.modeling.models.own_peaks import own_peaks
+from tactileq.modeling.models.terms import FORCE, SPEED, SPEED_FORCE, TERMS, DrivenBy
+from tactileq.modeling.regression.centroid import (
     centroid_correlations,
     centroid_regression,
     spectral_centroid_hz,
     with_centroid,
 )
-from modeling.regression.least_squares import ALPHA, Regression
-from modeling.regression.parameters import (
+from tactileq.modeling.regression.least_squares import ALPHA, Regression
+from tactileq.modeling.regression.parameters import (
     PARAMETERS,
     ParameterRegression,
     parameter_regressions,
@@ -116,7 +116,7 @@ def regression_table(models: Sequence[TextureModel]) -> pd.DataFrame:
         intercept, p_intercept, and for speed, force and speed_force the coefficient
         (…_coefficient; per mm/s, N and mm/s·N), p (p_…) and mark (mark_…); reduced: the
         terms that backward elimination leaves, reduced_adjusted_r_squared; simulated. What cannot
-        be said is NaN (see `modeling.regression.least_squares.Regression`).
+        be said is NaN (see `tactileq.modeling.regression.least_squares.Regression`).
     """
     rows = []
     for model in models:
@@ -444,7 +444,7 @@ def driven_table(full: TextureModel, targets: Sequence[ConditionTarget]) -> pd.D
     DataFrame
         One row each for grid, conditions (reduced regressions on speed, force and their product)
         and, where the model has a layer, centroid: texture, driven_by, numbers (stored in all),
-        conditions, and the measures of `analysis.textures.likeness.gfc_table`.
+        conditions, and the measures of `tactileq.analysis.textures.likeness.gfc_table`.
     """
     models: dict[str, TextureModel | RegressedModel] = {GRID: full}
     numbers = [full.noise_gains.size * full.n_parameters]

@@ -8,11 +8,11 @@ from dataclasses import asdict, dataclass, field, fields
 import numpy as np
 import pandas as pd
 
-from analysis.columns import LAYER, SIMULATED_COLUMN, TEXTURE
-from modeling import InputError, LayerVerdict, RecordingSet, Simplification, Spectrum, TextureModel
-from modeling.errors import shown
-from modeling.files.columns import Column
-from modeling.fitting.conditions import recording_spectra
+from tactileq.analysis.columns import LAYER, SIMULATED_COLUMN, TEXTURE
+from tactileq.modeling import InputError, LayerVerdict, RecordingSet, Simplification, Spectrum, TextureModel
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.columns import Column
+from tactileq.modeling.fitting.conditions import recording_spectra
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class TextureResult:
         Models of other estimators, to be compared with the truth beside `model`.
     left_out : mapping of str to DataFrame
         By model (joint, AR(20), a field of spectra): conditions predicted by one that was fitted
-        without them (`analysis.textures.between.left_out_table`); empty where that was not tried.
+        without them (`tactileq.analysis.textures.between.left_out_table`); empty where that was not tried.
     """
 
     recordings: RecordingSet
@@ -100,7 +100,7 @@ def simplification_table(simplification: Simplification) -> pd.DataFrame:
         texture, layer (1-based), verdict (kept|dropped), reason, worst_speed_mm_s, worst_force_n,
         worst_frequency_hz (the condition where what decides is highest against the threshold),
         distance_db (to the threshold there, + above), flip_probability (0–1), assumed and fills
-        (as in `modeling.LayerVerdict`), simulated, full_sha256 and threshold_sha256.
+        (as in `tactileq.modeling.LayerVerdict`), simulated, full_sha256 and threshold_sha256.
     """
     columns = [each.name for each in fields(LayerVerdict)]
     table = pd.DataFrame([asdict(v) for v in simplification.layers], columns=columns)
@@ -134,7 +134,7 @@ def fit_table(results: Sequence[TextureResult]) -> pd.DataFrame:
     -------
     DataFrame
         texture, layers, distance_db, with_blends_db, blend_defect_db (as in
-        `modeling.models.fit_summary.FitSummary`), by_layers and warnings (text), simulated.
+        `tactileq.modeling.models.fit_summary.FitSummary`), by_layers and warnings (text), simulated.
     """
     rows = [
         {

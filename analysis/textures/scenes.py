@@ -8,12 +8,12 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.columns import SIMULATED_COLUMN, TEXTURE
-from analysis.labels import ALL_TEXTURES
-from modeling import CompiledScene
-from modeling.files.columns import Column, names
-from modeling.scenes.compiled import CompiledTexture
-from modeling.scenes.cost import stored_numbers
+from tactileq.analysis.columns import SIMULATED_COLUMN, TEXTURE
+from tactileq.analysis.labels import ALL_TEXTURES
+from tactileq.modeling import CompiledScene
+from tactileq.modeling.files.columns import Column, names
+from tactileq.modeling.scenes.compiled import CompiledTexture
+from tactileq.modeling.scenes.cost import stored_numbers
 
 _MEASURES = (
     ("gfc30", "GFC30", ""),

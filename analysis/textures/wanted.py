@@ -10,7 +10,7 @@ from itertools import product
 
 import numpy as np
 
-from modeling.models.grid import Condition, grid_axes
+from tactileq.modeling.models.grid import Condition, grid_axes
 
 # Conditions that differ by less in speed and in force are one for a hand: half of what a stroke
 # may deviate from its condition (docs/method/strokes.md#cells).

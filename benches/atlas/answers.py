@@ -1,7 +1,7 @@
 """The tests of answers in the atlas: effects of ceilings, careless raters and few participants.
 
 Simulated are ratings of a full and a simplified model, one of each per rater, and answers of the
-forced choice; they are analysed by the functions of `analysis.statistics` themselves. The same
+forced choice; they are analysed by the functions of `tactileq.analysis.statistics` themselves. The same
 raters are drawn along the whole axis, so that edges are clean.
 """
 
@@ -16,13 +16,13 @@ import numpy as np
 from scipy import stats
 from scipy.optimize import brentq
 
-from analysis.statistics.paired import (
+from tactileq.analysis.statistics.paired import (
     d_z_interval,
     t_tests,
     without_rounding_noise,
 )
-from benches.atlas.case import Axis, Case
-from benches.raters import (
+from tactileq.benches.atlas.case import Axis, Case
+from tactileq.benches.raters import (
     HIGHEST,
     MISS_RATE,
     at_random,
@@ -31,8 +31,8 @@ from benches.raters import (
     mean_at_the_end,
     paired_power,
 )
-from modeling.arrays import Bools, Floats
-from modeling.seeds import generator
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.seeds import generator
 
 FAMILY = "answers"
 SEED = 17

@@ -10,18 +10,18 @@ from functools import partial
 
 import numpy as np
 
-from benches.atlas.case import Axis, Case
-from benches.rendering.stability import FORMS, OURS, held_variances
-from modeling import TextureModel
-from modeling.arrays import Floats
-from modeling.equalizer.bands import band_rms
-from modeling.models.line_spectral import (
+from tactileq.benches.atlas.case import Axis, Case
+from tactileq.benches.rendering.stability import FORMS, OURS, held_variances
+from tactileq.modeling import TextureModel
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.bands import band_rms
+from tactileq.modeling.models.line_spectral import (
     line_spectral_frequencies,
     prediction_coefficients,
     reflection_coefficients,
 )
-from modeling.models.parameter_table import Parameters
-from modeling.models.texture_model import Blending
+from tactileq.modeling.models.parameter_table import Parameters
+from tactileq.modeling.models.texture_model import Blending
 
 RATE_HZ = 5000.0
 SLOW_MM_S, FORCE_N = 50.0, 1.0
@@ -107,7 +107,7 @@ def _all_pole(at: Parameters, number: int, *, order: int) -> tuple[Floats, float
     """Coefficients and gain by Yule–Walker on the truth's own autocorrelation."""
     from scipy.linalg import solve_toeplitz
 
-    from modeling.models.texture_model import first_peq
+    from tactileq.modeling.models.texture_model import first_peq
 
     one = Parameters(*(part[number : number + 1] for part in at))
     frequency = np.fft.rfftfreq(SPECTRUM_SAMPLES, 1 / RATE_HZ)

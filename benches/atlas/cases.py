@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from benches.atlas import (
+from tactileq.benches.atlas import (
     answers,
     blending,
     filters,
@@ -13,7 +13,7 @@ from benches.atlas import (
     verdicts,
     vibrators,
 )
-from benches.atlas.case import Case
+from tactileq.benches.atlas.case import Case
 
 CASES: tuple[Case, ...] = (
     *filters.CASES,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from benches.atlas.case import FAILS, HOLDS, Case, Verdict
+from tactileq.benches.atlas.case import FAILS, HOLDS, Case, Verdict
 
 CELLS = {False: 3, True: 5}
 # From mild to severe as long as a method holds: an edge is no single lucky run.

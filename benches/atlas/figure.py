@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullLocator
 
-from analysis.page.drawing import (
+from tactileq.analysis.page.drawing import (
     BLACK,
     BLUE,
     GREY,
@@ -25,9 +25,9 @@ from analysis.page.drawing import (
     shared_legend,
     stamp_if_simulated,
 )
-from benches.atlas.case import DEGRADES, FAILS, HOLDS, VERDICTS, Axis, Case
-from benches.atlas.edges import Examined
-from benches.atlas.tables import LEAST_MARGIN, theory_of
+from tactileq.benches.atlas.case import DEGRADES, FAILS, HOLDS, VERDICTS, Axis, Case
+from tactileq.benches.atlas.edges import Examined
+from tactileq.benches.atlas.tables import LEAST_MARGIN, theory_of
 
 COLOURS = {HOLDS: BLUE, DEGRADES: ORANGE, FAILS: VERMILLION}
 BARS = {HOLDS: SKY_BLUE, DEGRADES: ORANGE, FAILS: VERMILLION}

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import sosfilt
 
-from benches.atlas.case import Axis, Case
-from benches.rendering.stability import (
+from tactileq.benches.atlas.case import Axis, Case
+from tactileq.benches.rendering.stability import (
     CENTRES_HZ,
     DIRECT,
     FORMS,
@@ -27,11 +27,11 @@ from benches.rendering.stability import (
     held_variances,
     moving_variances,
 )
-from modeling import Renderer, TextureModel
-from modeling.arrays import Floats
-from modeling.equalizer.bands import band_rms
-from modeling.models.parameter_table import Parameters
-from stimuli.planted.textures import CATALOGUE
+from tactileq.modeling import Renderer, TextureModel
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.bands import band_rms
+from tactileq.modeling.models.parameter_table import Parameters
+from tactileq.stimuli.planted.textures import CATALOGUE
 
 RATE_HZ = 5000.0
 CENTRE_HZ, WIDTH_HZ = 300.0, 40.0

@@ -10,22 +10,22 @@ from functools import cache, partial
 
 import numpy as np
 
-from benches.atlas.case import Axis, Case
-from benches.rendering.accuracy import (
+from tactileq.benches.atlas.case import Axis, Case
+from tactileq.benches.rendering.accuracy import (
     FASTEST_MM_S,
     level_errors,
     speed_errors,
     stroke,
     update_error_db,
 )
-from benches.rendering.clicks import loudest_above_click_hz_db, switched, this_renderer
-from benches.rendering.crests import crest_difference_db
-from benches.rendering.other_rates import rate_errors
-from benches.rendering.stability import DIRECT, OURS, PLAIN, STROKE_HZ
-from modeling import TextureModel
-from modeling.hand import Hand
-from modeling.rendering.plan import SLOPE_S, RenderPlan
-from stimuli.planted.textures import SPEEDS_MM_S, planted_texture
+from tactileq.benches.rendering.clicks import loudest_above_click_hz_db, switched, this_renderer
+from tactileq.benches.rendering.crests import crest_difference_db
+from tactileq.benches.rendering.other_rates import rate_errors
+from tactileq.benches.rendering.stability import DIRECT, OURS, PLAIN, STROKE_HZ
+from tactileq.modeling import TextureModel
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.rendering.plan import SLOPE_S, RenderPlan
+from tactileq.stimuli.planted.textures import SPEEDS_MM_S, planted_texture
 
 RATE_HZ = 5000.0
 UPDATE_S = 1e-3  # the default of `Renderer`

@@ -16,17 +16,17 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize
 from scipy.special import erfinv
 
-from analysis.textures.recovery import match_layers
-from benches.atlas.case import Axis, Case
-from modeling import PEQ, Layers, Recording, RecordingSet, find_layers
-from modeling.arrays import Floats, Integers
-from modeling.equalizer.bands import band_response, band_rms
-from modeling.estimation.paper import BANDWIDTH_PER_S
-from modeling.estimation.peaks import PENALTY
-from modeling.fitting.conditions import recording_spectra
-from modeling.recordings.spectrum import SMOOTHING_HZ
-from modeling.seeds import generator
-from stimuli.planted.spectra import RATE_HZ, RandomTruth, TruthKind
+from tactileq.analysis.textures.recovery import match_layers
+from tactileq.benches.atlas.case import Axis, Case
+from tactileq.modeling import PEQ, Layers, Recording, RecordingSet, find_layers
+from tactileq.modeling.arrays import Floats, Integers
+from tactileq.modeling.equalizer.bands import band_response, band_rms
+from tactileq.modeling.estimation.paper import BANDWIDTH_PER_S
+from tactileq.modeling.estimation.peaks import PENALTY
+from tactileq.modeling.fitting.conditions import recording_spectra
+from tactileq.modeling.recordings.spectrum import SMOOTHING_HZ
+from tactileq.modeling.seeds import generator
+from tactileq.stimuli.planted.spectra import RATE_HZ, RandomTruth, TruthKind
 
 FAMILY = "peak finding"
 SEED = 13

@@ -10,8 +10,8 @@ from functools import partial
 
 import numpy as np
 
-from benches.atlas.case import Axis, Case
-from benches.atlas.hands import (
+from tactileq.benches.atlas.case import Axis, Case
+from tactileq.benches.atlas.hands import (
     AS_READ,
     DEGRADES_LEVEL_DB,
     HOLDS_LEVEL_DB,
@@ -21,15 +21,15 @@ from benches.atlas.hands import (
     UPDATE_S,
     error_case,
 )
-from benches.rendering.accuracy import stroke
-from modeling import Renderer
-from modeling.arrays import Floats
-from modeling.hand import Hand
-from modeling.models.grid import Cells
-from modeling.seeds import generator
-from modeling.similarity import BAND_EDGES_HZ
-from stimuli.planted.drawn import FORCES_N, SPEEDS_MM_S, DrawnSurface, draw_surface
-from stimuli.planted.textures import planted_texture
+from tactileq.benches.rendering.accuracy import stroke
+from tactileq.modeling import Renderer
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.models.grid import Cells
+from tactileq.modeling.seeds import generator
+from tactileq.modeling.similarity import BAND_EDGES_HZ
+from tactileq.stimuli.planted.drawn import FORCES_N, SPEEDS_MM_S, DrawnSurface, draw_surface
+from tactileq.stimuli.planted.textures import planted_texture
 
 WITH_TIMES, AS_OF_NOW = "readings with their times", "readings as of now"
 CHATTER_PER_S = 40

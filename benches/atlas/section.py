@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.columns import table_bytes
-from analysis.page.outcomes import Outcome, described
-from analysis.page.page import (
+from tactileq.analysis.columns import table_bytes
+from tactileq.analysis.page.outcomes import Outcome, described
+from tactileq.analysis.page.page import (
     PICTURE_DPI,
     Fold,
     Item,
@@ -22,13 +22,13 @@ from analysis.page.page import (
     picture_html,
     table_html,
 )
-from analysis.page.provenance import PROVENANCE_COLUMNS, unfolded
-from analysis.page.saving import png_of, svg_of, warn_of_missing_fonts
-from analysis.page.sections import Section
-from benches.atlas.cases import TO_COME
-from benches.atlas.edges import Examined
-from benches.atlas.figure import figure_atlas, figure_margins
-from benches.atlas.tables import (
+from tactileq.analysis.page.provenance import PROVENANCE_COLUMNS, unfolded
+from tactileq.analysis.page.saving import png_of, svg_of, warn_of_missing_fonts
+from tactileq.analysis.page.sections import Section
+from tactileq.benches.atlas.cases import TO_COME
+from tactileq.benches.atlas.edges import Examined
+from tactileq.benches.atlas.figure import figure_atlas, figure_margins
+from tactileq.benches.atlas.tables import (
     CELL_COLUMNS,
     EDGE_COLUMNS,
     LEAST_MARGIN,
@@ -37,8 +37,8 @@ from benches.atlas.tables import (
     edge_table,
     margin_table,
 )
-from modeling.errors import counted
-from modeling.files.columns import chosen, names, without
+from tactileq.modeling.errors import counted
+from tactileq.modeling.files.columns import chosen, names, without
 
 BANNER = "SIMULATED: every run uses simulated signals, hand movements, recordings and answers."
 ATLAS_NOTE = (

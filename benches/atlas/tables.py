@@ -9,10 +9,10 @@ from itertools import groupby
 import numpy as np
 import pandas as pd
 
-from analysis.columns import SIMULATED_COLUMN
-from benches.atlas.case import HOLDS, Axis
-from benches.atlas.edges import Examined
-from modeling.files.columns import Column
+from tactileq.analysis.columns import SIMULATED_COLUMN
+from tactileq.benches.atlas.case import HOLDS, Axis
+from tactileq.benches.atlas.edges import Examined
+from tactileq.modeling.files.columns import Column
 
 LEAST_MARGIN = 2.0
 

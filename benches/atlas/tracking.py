@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from analysis.textures.recovery import match_layers
-from benches.atlas.case import Axis, Case
-from modeling import TextureModel, fit_texture
-from modeling.arrays import Floats
-from modeling.estimation.paper import BANDWIDTH_PER_S
-from modeling.recordings.spectrum import SMOOTHING_HZ
-from modeling.seeds import generator
-from stimuli.planted.textures import record_texture
+from tactileq.analysis.textures.recovery import match_layers
+from tactileq.benches.atlas.case import Axis, Case
+from tactileq.modeling import TextureModel, fit_texture
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.estimation.paper import BANDWIDTH_PER_S
+from tactileq.modeling.recordings.spectrum import SMOOTHING_HZ
+from tactileq.modeling.seeds import generator
+from tactileq.stimuli.planted.textures import record_texture
 
 FAMILY = "tracking"
 SEED = 23

@@ -16,17 +16,17 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri
 
-from analysis.textures.recovery import match_layers
-from benches.atlas.case import Axis, Case
-from modeling import TextureModel, Threshold, fit_texture
-from modeling.arrays import Bools, Floats, Integers
-from modeling.equalizer.bands import band_response
-from modeling.perception.by_power import judge_of
-from modeling.perception.dropping import HIGHEST_FLIP_PROBABILITY
-from modeling.perception.simplification import distances_db
-from modeling.perception.thresholds import FREQUENCIES_HZ
-from modeling.seeds import generator
-from stimuli.planted.textures import record_texture
+from tactileq.analysis.textures.recovery import match_layers
+from tactileq.benches.atlas.case import Axis, Case
+from tactileq.modeling import TextureModel, Threshold, fit_texture
+from tactileq.modeling.arrays import Bools, Floats, Integers
+from tactileq.modeling.equalizer.bands import band_response
+from tactileq.modeling.perception.by_power import judge_of
+from tactileq.modeling.perception.dropping import HIGHEST_FLIP_PROBABILITY
+from tactileq.modeling.perception.simplification import distances_db
+from tactileq.modeling.perception.thresholds import FREQUENCIES_HZ
+from tactileq.modeling.seeds import generator
+from tactileq.stimuli.planted.textures import record_texture
 
 FAMILY = "simplification verdicts"
 SEED = 19

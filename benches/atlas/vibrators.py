@@ -11,12 +11,12 @@ from functools import cache, partial
 
 import numpy as np
 
-from benches.atlas.case import Axis, Case
-from modeling import InputError, Vibrator, compensation_for, identify_vibrator
-from modeling.arrays import Floats
-from modeling.vibrators.compensation import FLAT_WITHIN_DB, Compensation
-from modeling.vibrators.identification import LEAST_COHERENCE
-from stimuli.planted.vibrators import SimulatedVibrator, planted_vibrator
+from tactileq.benches.atlas.case import Axis, Case
+from tactileq.modeling import InputError, Vibrator, compensation_for, identify_vibrator
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.vibrators.compensation import FLAT_WITHIN_DB, Compensation
+from tactileq.modeling.vibrators.identification import LEAST_COHERENCE
+from tactileq.stimuli.planted.vibrators import SimulatedVibrator, planted_vibrator
 
 RATE_HZ = 5000.0
 RESONANCE_HZ = 80.0

@@ -10,18 +10,18 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from benches.chart.judging import SINGLE, Judged
-from benches.chart.summary import (
+from tactileq.benches.chart.judging import SINGLE, Judged
+from tactileq.benches.chart.summary import (
     RivalComparison,
     comparisons,
     front_table,
     summarised,
 )
-from benches.chart.surfaces import Kind
-from benches.chart.timing import KEY, TURNS, Key, stream_of, time_table
-from benches.rendering.bench import processor
-from benches.rendering.timer import Turn
-from modeling import InputError
+from tactileq.benches.chart.surfaces import Kind
+from tactileq.benches.chart.timing import KEY, TURNS, Key, stream_of, time_table
+from tactileq.benches.rendering.bench import processor
+from tactileq.benches.rendering.timer import Turn
+from tactileq.modeling import InputError
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

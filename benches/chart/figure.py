@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
-from analysis.page.drawing import (
+from tactileq.analysis.page.drawing import (
     BLACK,
     BLUE,
     GREEN,
@@ -25,9 +25,9 @@ from analysis.page.drawing import (
     shared_legend,
     stamp_if_simulated,
 )
-from benches.chart.chart import Chart
-from benches.chart.judging import AT, BETWEEN, LOADED, STROKING
-from benches.chart.methods import (
+from tactileq.benches.chart.chart import Chart
+from tactileq.benches.chart.judging import AT, BETWEEN, LOADED, STROKING
+from tactileq.benches.chart.methods import (
     AUTOREGRESSIVE,
     GRAINS,
     LOOPS,
@@ -38,8 +38,8 @@ from benches.chart.methods import (
     TRUTH,
     WHITE,
 )
-from benches.chart.summary import default_rows, front_of
-from benches.chart.surfaces import Kind, counted_kind
+from tactileq.benches.chart.summary import default_rows, front_of
+from tactileq.benches.chart.surfaces import Kind, counted_kind
 
 # By family: colour, marker, and whether its methods are steps of one number and joined by a line.
 STYLES: dict[str, tuple[str, str, bool]] = {

@@ -9,21 +9,21 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analysis.textures.between import Truth
-from benches.chart.rival_costs import COST_RATE_HZ
-from benches.rendering.accuracy import rendered_parameters
-from benches.rendering.levels import levels_in_motion, louder_by, systems_of_layers
-from modeling import RegressedModel, Renderer, TextureModel
-from modeling.arrays import Floats
-from modeling.hand import Hand
-from modeling.models.parameter_table import Parameters
-from modeling.models.texture_model import BLENDINGS, first_peq
-from modeling.rendering.cost import Cost
-from modeling.rendering.plan import RenderPlan
-from modeling.rendering.reference.hand import Extrapolator
-from modeling.scenes.cost import stored_numbers
-from modeling.similarity import SpectralFilter
-from stimuli.planted.textures import FORCES_N, SPEEDS_MM_S
+from tactileq.analysis.textures.between import Truth
+from tactileq.benches.chart.rival_costs import COST_RATE_HZ
+from tactileq.benches.rendering.accuracy import rendered_parameters
+from tactileq.benches.rendering.levels import levels_in_motion, louder_by, systems_of_layers
+from tactileq.modeling import RegressedModel, Renderer, TextureModel
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.models.parameter_table import Parameters
+from tactileq.modeling.models.texture_model import BLENDINGS, first_peq
+from tactileq.modeling.rendering.cost import Cost
+from tactileq.modeling.rendering.plan import RenderPlan
+from tactileq.modeling.rendering.reference.hand import Extrapolator
+from tactileq.modeling.scenes.cost import stored_numbers
+from tactileq.modeling.similarity import SpectralFilter
+from tactileq.stimuli.planted.textures import FORCES_N, SPEEDS_MM_S
 
 
 class Fitted(Protocol):

@@ -10,24 +10,24 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.textures.between import Measured
-from benches.chart.fitted import Fitted, Layered, update_samples
-from benches.chart.measures import (
+from tactileq.analysis.textures.between import Measured
+from tactileq.benches.chart.fitted import Fitted, Layered, update_samples
+from tactileq.benches.chart.measures import (
     Accuracy,
     RecordYardstick,
     ReferenceMagnitude,
     frequencies_hz,
     over_conditions,
 )
-from benches.chart.methods import TRUTH, Fit, Subject, fit_method
-from benches.chart.rival_fits import ByBlock, Filtered
-from benches.chart.surfaces import Material, Origin, judged_stroke, load_material
-from modeling import ARModel, InputError
-from modeling.fitting.conditions import spectra_by_condition
-from modeling.models.grid import Condition
-from modeling.models.loading import load_model
-from modeling.recordings.spectrum import mean_spectrum
-from modeling.threads import one_linear_algebra_thread
+from tactileq.benches.chart.methods import TRUTH, Fit, Subject, fit_method
+from tactileq.benches.chart.rival_fits import ByBlock, Filtered
+from tactileq.benches.chart.surfaces import Material, Origin, judged_stroke, load_material
+from tactileq.modeling import ARModel, InputError
+from tactileq.modeling.fitting.conditions import spectra_by_condition
+from tactileq.modeling.models.grid import Condition
+from tactileq.modeling.models.loading import load_model
+from tactileq.modeling.recordings.spectrum import mean_spectrum
+from tactileq.modeling.threads import one_linear_algebra_thread
 
 UPDATES_MS = (1.0, 4.0, 16.0)
 DOUBLE, SINGLE = "double", "single"

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling import Spectrum, similarity
-from modeling.arrays import Bools, Floats
-from modeling.recordings.spectrum import smooth
-from modeling.similarity import (
+from tactileq.modeling import Spectrum, similarity
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.recordings.spectrum import smooth
+from tactileq.modeling.similarity import (
     HIGHEST_SHARE,
     LOWEST_HZ,
     SIGMAS_HZ,
@@ -27,7 +27,7 @@ BANDS = 9  # those of real surfaces' tables, 10 … 480 Hz
 
 
 class Accuracy(NamedTuple):
-    """One condition. The GFCs as in `modeling.similarity`; the rest in dB.
+    """One condition. The GFCs as in `tactileq.modeling.similarity`; the rest in dB.
 
     `distance_db`: RMS of the log ratio over frequency, of a known truth unsmoothed, of recordings
     smoothed with σ = 30 Hz. `bands_db`: RMS of the level errors in nine bands, 10 … 480 Hz.

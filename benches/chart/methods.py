@@ -9,26 +9,26 @@ from time import process_time
 
 import numpy as np
 
-from analysis.textures.between import Measured, Truth
-from benches.chart.fitted import Fitted, Itself, Layered
-from benches.chart.rival_costs import block_samples, grain_samples
-from benches.chart.rival_fits import Filtered, Grained, Looped, Shaped
-from benches.chart.shaped_noise import fit_shaped_noise
-from benches.rendering.coefficients import fit_sections, tabled, tabled_bands
-from benches.rendering.stored_sounds import Magnitude, grains_of, make_loops
-from modeling import InputError, Spectrum, TextureModel, Threshold, regressed, simplify
-from modeling.arrays import Floats
-from modeling.errors import counted, shown
-from modeling.estimation.likelihood import is_silent
-from modeling.fitting.autoregressive import fit_ar_spectra
-from modeling.fitting.conditions import spectra_by_condition
-from modeling.fitting.spectral_field import fit_field_to_spectra
-from modeling.fitting.texture import fit_spectra
-from modeling.models.grid import Condition, fill_grid, grid_axes
-from modeling.models.terms import DrivenBy
-from modeling.perception.verdicts import CRITERIA, CriterionName
-from modeling.recordings.recording import Recording
-from modeling.recordings.spectrum import mean_spectrum, smooth
+from tactileq.analysis.textures.between import Measured, Truth
+from tactileq.benches.chart.fitted import Fitted, Itself, Layered
+from tactileq.benches.chart.rival_costs import block_samples, grain_samples
+from tactileq.benches.chart.rival_fits import Filtered, Grained, Looped, Shaped
+from tactileq.benches.chart.shaped_noise import fit_shaped_noise
+from tactileq.benches.rendering.coefficients import fit_sections, tabled, tabled_bands
+from tactileq.benches.rendering.stored_sounds import Magnitude, grains_of, make_loops
+from tactileq.modeling import InputError, Spectrum, TextureModel, Threshold, regressed, simplify
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import counted, shown
+from tactileq.modeling.estimation.likelihood import is_silent
+from tactileq.modeling.fitting.autoregressive import fit_ar_spectra
+from tactileq.modeling.fitting.conditions import spectra_by_condition
+from tactileq.modeling.fitting.spectral_field import fit_field_to_spectra
+from tactileq.modeling.fitting.texture import fit_spectra
+from tactileq.modeling.models.grid import Condition, fill_grid, grid_axes
+from tactileq.modeling.models.terms import DrivenBy
+from tactileq.modeling.perception.verdicts import CRITERIA, CriterionName
+from tactileq.modeling.recordings.recording import Recording
+from tactileq.modeling.recordings.spectrum import mean_spectrum, smooth
 
 OUR_METHOD, TRUTH, WHITE = "joint", "truth", "white noise"
 MOST_LAYERS = 8

@@ -10,9 +10,9 @@ from importlib import resources
 import numpy as np
 import pandas as pd
 
-from analysis.columns import table_bytes
-from analysis.page.outcomes import described
-from analysis.page.page import (
+from tactileq.analysis.columns import table_bytes
+from tactileq.analysis.page.outcomes import described
+from tactileq.analysis.page.page import (
     PICTURE_DPI,
     Picture,
     Table,
@@ -22,22 +22,22 @@ from analysis.page.page import (
     picture_html,
     table_html,
 )
-from analysis.page.saving import png_of, warn_of_missing_fonts
-from analysis.page.sections import Section
-from benches.chart.chart import Chart
-from benches.chart.figure import STYLES, figure_chart
-from benches.chart.judging import PLACES
-from benches.chart.methods import OUR_METHOD
-from benches.chart.summary import (
+from tactileq.analysis.page.saving import png_of, warn_of_missing_fonts
+from tactileq.analysis.page.sections import Section
+from tactileq.benches.chart.chart import Chart
+from tactileq.benches.chart.figure import STYLES, figure_chart
+from tactileq.benches.chart.judging import PLACES
+from tactileq.benches.chart.methods import OUR_METHOD
+from tactileq.benches.chart.summary import (
     METHOD_COLUMNS,
     RIVAL_COMPARISON_COLUMNS,
     comparison_table,
     default_rows,
 )
-from benches.chart.surfaces import SURFACE_KINDS, Kind, counted_kind
-from modeling.errors import counted
-from modeling.extras import extra
-from modeling.files.columns import names, without
+from tactileq.benches.chart.surfaces import SURFACE_KINDS, Kind, counted_kind
+from tactileq.modeling.errors import counted
+from tactileq.modeling.extras import extra
+from tactileq.modeling.files.columns import names, without
 
 COSTS = (
     ("operations", "operations per sample at 5 kHz"),
@@ -260,7 +260,7 @@ def plotly_script() -> str:
 def _interactive(chart: Chart) -> str:
     kinds = [(kind, SURFACE_KINDS[kind]) for kind in chart.kinds]
     data = json.dumps(_data(chart), allow_nan=False).replace("</", "<\\/")
-    script = resources.files("benches.chart").joinpath("chart_page.js")
+    script = resources.files("tactileq.benches.chart").joinpath("chart_page.js")
     return (
         "<p>"
         + _select("kind", "Surfaces", kinds)

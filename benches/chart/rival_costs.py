@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from modeling.rendering.cost import Cost, Operations
+from tactileq.modeling.rendering.cost import Cost, Operations
 
 # All costs are those of rendering at this rate, whatever the rate of the recordings.
 COST_RATE_HZ = 5000.0

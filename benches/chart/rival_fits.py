@@ -8,8 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
-from benches.chart.fitted import at, extrapolated, extrapolated_to_ends, update_samples
-from benches.chart.rival_costs import (
+from tactileq.benches.chart.fitted import at, extrapolated, extrapolated_to_ends, update_samples
+from tactileq.benches.chart.rival_costs import (
     COST_RATE_HZ,
     bands_cost,
     block_samples,
@@ -19,16 +19,16 @@ from benches.chart.rival_costs import (
     loops_cost,
     shaped_noise_cost,
 )
-from benches.chart.shaped_noise import ShapedFilter, ShapedNoise
-from benches.rendering.coefficients import BandTable, CoefficientTable, tabled_predictor
-from benches.rendering.levels import levels_in_motion, louder_by
-from benches.rendering.stored_sounds import Grains, Loops, SampledResponse, Sounds
-from modeling import ARModel
-from modeling.arrays import Floats
-from modeling.hand import Hand
-from modeling.models.grid import within_grid
-from modeling.rendering.cost import Cost
-from modeling.similarity import SpectralFilter
+from tactileq.benches.chart.shaped_noise import ShapedFilter, ShapedNoise
+from tactileq.benches.rendering.coefficients import BandTable, CoefficientTable, tabled_predictor
+from tactileq.benches.rendering.levels import levels_in_motion, louder_by
+from tactileq.benches.rendering.stored_sounds import Grains, Loops, SampledResponse, Sounds
+from tactileq.modeling import ARModel
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.models.grid import within_grid
+from tactileq.modeling.rendering.cost import Cost
+from tactileq.modeling.similarity import SpectralFilter
 
 
 @dataclass(frozen=True, eq=False)

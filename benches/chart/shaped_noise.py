@@ -13,9 +13,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
-from modeling.models.grid import Cells, Condition, fill_grid, grid_axes, within_grid
-from modeling.recordings.spectrum import Spectrum, mean_spectrum
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.models.grid import Cells, Condition, fill_grid, grid_axes, within_grid
+from tactileq.modeling.recordings.spectrum import Spectrum, mean_spectrum
 
 
 @dataclass(frozen=True, eq=False)

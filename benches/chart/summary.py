@@ -10,12 +10,12 @@ import numpy as np
 import pandas as pd
 from scipy.special import stdtrit
 
-from benches.chart.judging import AT, BETWEEN, DOUBLE, PLACES, STROKING, UPDATES_MS
-from benches.chart.measures import SUMMARIES
-from benches.chart.methods import OUR_FAMILIES, OUR_METHOD, RIVALS
-from modeling.arrays import Bools, Floats
-from modeling.files.columns import Column, Columns, names
-from modeling.models.texture_model import BLENDINGS
+from tactileq.benches.chart.judging import AT, BETWEEN, DOUBLE, PLACES, STROKING, UPDATES_MS
+from tactileq.benches.chart.measures import SUMMARIES
+from tactileq.benches.chart.methods import OUR_FAMILIES, OUR_METHOD, RIVALS
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.files.columns import Column, Columns, names
+from tactileq.modeling.models.texture_model import BLENDINGS
 
 VARIANT = ["kind", "method", "family", "blending", "default_blending", "update_ms", "precision"]
 COSTS = ("operations", "most_operations", "numbers", "bytes", "fit_ms", "layers")

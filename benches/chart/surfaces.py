@@ -11,20 +11,20 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analysis.textures.between import Measured, Truth, chessboard, halfway
-from benches.rendering.accuracy import stroke
-from modeling import InputError, RecordingSet
-from modeling.arrays import Floats
-from modeling.errors import counted, shown
-from modeling.fitting.conditions import recording_spectra
-from modeling.hand import Hand
-from modeling.models.grid import Condition, grid_axes
-from modeling.models.loading import load_model, models_in
-from modeling.recordings.recording_set import load_usable, textures_in
-from rig.importing.hatt import HattTexture
-from rig.importing.hatt_reader import load_hatt
-from stimuli.planted.drawn import draw_surface
-from stimuli.planted.textures import (
+from tactileq.analysis.textures.between import Measured, Truth, chessboard, halfway
+from tactileq.benches.rendering.accuracy import stroke
+from tactileq.modeling import InputError, RecordingSet
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import counted, shown
+from tactileq.modeling.fitting.conditions import recording_spectra
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.models.grid import Condition, grid_axes
+from tactileq.modeling.models.loading import load_model, models_in
+from tactileq.modeling.recordings.recording_set import load_usable, textures_in
+from tactileq.rig.importing.hatt import HattTexture
+from tactileq.rig.importing.hatt_reader import load_hatt
+from tactileq.stimuli.planted.drawn import draw_surface
+from tactileq.stimuli.planted.textures import (
     FORCES_N,
     RECORDER_RATE_HZ,
     SPEEDS_MM_S,

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from benches.chart.fitted import Fitted, Layered, update_samples
-from benches.chart.rival_costs import COST_RATE_HZ
-from benches.chart.rival_fits import Filtered, Grained, Looped, Shaped
-from benches.rendering.coefficients import BandTable
-from benches.rendering.rivals import BANDS, COEFFICIENTS, CompiledStream, SoundStream
-from benches.rendering.timer import Turn, turn_ns
-from modeling import Renderer
-from modeling.hand import Hand
+from tactileq.benches.chart.fitted import Fitted, Layered, update_samples
+from tactileq.benches.chart.rival_costs import COST_RATE_HZ
+from tactileq.benches.chart.rival_fits import Filtered, Grained, Looped, Shaped
+from tactileq.benches.rendering.coefficients import BandTable
+from tactileq.benches.rendering.rivals import BANDS, COEFFICIENTS, CompiledStream, SoundStream
+from tactileq.benches.rendering.timer import Turn, turn_ns
+from tactileq.modeling import Renderer
+from tactileq.modeling.hand import Hand
 
 TURNS = 20
 WARM_UP = 2

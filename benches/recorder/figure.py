@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.page.drawing import (
+from tactileq.analysis.page.drawing import (
     BLACK,
     BLUE,
     GREY,
@@ -23,9 +23,9 @@ def figure_recorder(records: pd.DataFrame, near: pd.DataFrame) -> Figure:
     Parameters
     ----------
     records : DataFrame
-        `rig.recorder.store.RECORDER_COLUMNS`, of a simulated recorder.
+        `tactileq.rig.recorder.store.RECORDER_COLUMNS`, of a simulated recorder.
     near : DataFrame
-        `benches.recorder.tables.NEAR_COLUMNS`.
+        `tactileq.benches.recorder.tables.NEAR_COLUMNS`.
     """
     figure = Figure(figsize=(12.6, 4.4), layout="constrained")
     force, speed, models = figure.subplots(1, 3, width_ratios=(1, 1, 1.2))

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import pandas as pd
 
-from analysis.page.page import Picture, Table
-from analysis.page.sections import Section
-from benches.recorder.figure import figure_recorder
-from benches.recorder.tables import (
+from tactileq.analysis.page.page import Picture, Table
+from tactileq.analysis.page.sections import Section
+from tactileq.benches.recorder.figure import figure_recorder
+from tactileq.benches.recorder.tables import (
     HELD_COLUMNS,
     MOVED_COLUMNS,
     NEAR_COLUMNS,
     held_table,
     moved_table,
 )
-from modeling.errors import counted
-from modeling.files.columns import Columns
+from tactileq.modeling.errors import counted
+from tactileq.modeling.files.columns import Columns
 
 
 def recorder_section(records: pd.DataFrame, near: pd.DataFrame, hand: pd.DataFrame) -> Section:
@@ -24,11 +24,11 @@ def recorder_section(records: pd.DataFrame, near: pd.DataFrame, hand: pd.DataFra
     Parameters
     ----------
     records : DataFrame
-        `rig.recorder.store.RECORDER_COLUMNS` of all textures.
+        `tactileq.rig.recorder.store.RECORDER_COLUMNS` of all textures.
     near : DataFrame
-        From `benches.recorder.tables.near_table`.
+        From `tactileq.benches.recorder.tables.near_table`.
     hand : DataFrame
-        From `analysis.answers.hand.load_hand`.
+        From `tactileq.analysis.answers.hand.load_hand`.
     """
     held, moved = held_table(records), moved_table(hand)
     mean_db, worst_db = near["difference_db"].mean(), near["difference_db"].max()

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.columns import TEXTURE
-from analysis.textures.between import Truth, halfway, truth_summary
-from modeling import TextureModel
-from modeling.files.columns import Column
-from modeling.files.tables import read_table
-from rig.recorder.store import RECORDER_COLUMNS, TABLE_NAME
+from tactileq.analysis.columns import TEXTURE
+from tactileq.analysis.textures.between import Truth, halfway, truth_summary
+from tactileq.modeling import TextureModel
+from tactileq.modeling.files.columns import Column
+from tactileq.modeling.files.tables import read_table
+from tactileq.rig.recorder.store import RECORDER_COLUMNS, TABLE_NAME
 
 HIGHEST_HZ, STEP_HZ = 1000.0, 5.0  # over which responses are compared
 LOWEST_HZ = 20.0
@@ -117,7 +117,7 @@ def moved_table(hand: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     hand : DataFrame
-        From `analysis.answers.hand.load_hand`.
+        From `tactileq.analysis.answers.hand.load_hand`.
 
     Returns
     -------

@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benches.rendering.stability import FORMS, OURS, STROKE_HZ, held_variances, moving_variances
-from modeling import RegressedModel, Renderer, TextureModel
-from modeling.hand import Hand
-from modeling.models.parameter_table import Parameters
-from modeling.rendering.plan import SLOPE_S, RenderPlan
-from modeling.rendering.reference.hand import Extrapolator
-from stimuli.planted.textures import FORCES_N, SPEEDS_MM_S
+from tactileq.benches.rendering.stability import FORMS, OURS, STROKE_HZ, held_variances, moving_variances
+from tactileq.modeling import RegressedModel, Renderer, TextureModel
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.models.parameter_table import Parameters
+from tactileq.modeling.rendering.plan import SLOPE_S, RenderPlan
+from tactileq.modeling.rendering.reference.hand import Extrapolator
+from tactileq.stimuli.planted.textures import FORCES_N, SPEEDS_MM_S
 
 FASTEST_MM_S = 300.0
 FORCE_N = 2.0

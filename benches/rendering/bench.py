@@ -20,8 +20,8 @@ import numpy as np
 import pandas as pd
 from scipy.stats import linregress
 
-from benches.rendering.coefficients import tabled_predictor
-from benches.rendering.rivals import (
+from tactileq.benches.rendering.coefficients import tabled_predictor
+from tactileq.benches.rendering.rivals import (
     AR,
     COMPILED,
     KERNEL,
@@ -36,15 +36,15 @@ from benches.rendering.rivals import (
     operations,
     predictor_of,
 )
-from benches.rendering.stored_sounds import Loops, make_loops
-from benches.rendering.timer import Turn, turn_ns
-from modeling import Renderer, TextureModel
-from modeling.arrays import Floats
-from modeling.hand import Hand
-from modeling.rendering.noise import stream_key
-from modeling.rendering.plan import LayeredModel, RenderPlan
-from modeling.rendering.reference.bands import BandFilter
-from modeling.rendering.reference.engine import PythonEngine
+from tactileq.benches.rendering.stored_sounds import Loops, make_loops
+from tactileq.benches.rendering.timer import Turn, turn_ns
+from tactileq.modeling import Renderer, TextureModel
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.rendering.noise import stream_key
+from tactileq.modeling.rendering.plan import LayeredModel, RenderPlan
+from tactileq.modeling.rendering.reference.bands import BandFilter
+from tactileq.modeling.rendering.reference.engine import PythonEngine
 
 LAYERS = (1, 3, 8)
 UPDATES = (1, 5, 32)
@@ -63,7 +63,7 @@ STROKE_HZ, FASTEST_MM_S, FORCE_N = 2.0, 300.0, (0.8, 2.4)
 _PYTHON_SAMPLES = 1000
 _SHARE_OF_BLOCKS = 8  # one of so many blocks of a turn is rendered by scipy, each timed by itself
 _IMPORT = (
-    "from time import perf_counter; start = perf_counter(); import modeling; "
+    "from time import perf_counter; start = perf_counter(); import tactileq.modeling; "
     "print(perf_counter() - start)"
 )
 
@@ -220,7 +220,7 @@ class RenderingBench:
             rows.append(_aim(what, at, row[what], least=least))
         sweep = f"{SWEEP[0]} to {SWEEP[-1]} layers"
         rows.append(_aim("cost is linear in layers: R²", sweep, self.line.r_squared, least=0.99))
-        rows.append(_aim("import modeling, s", "a process of its own", self.import_s, most=0.5))
+        rows.append(_aim("import tactileq.modeling, s", "a process of its own", self.import_s, most=0.5))
         return pd.DataFrame(rows)
 
 
@@ -425,7 +425,7 @@ def processor() -> str:
 
 def compiler() -> str:
     """What compiled the C parts, and all its flags: those of Python come first."""
-    ffi, lib = compiled_parts("benches.rendering._rivals")
+    ffi, lib = compiled_parts("tactileq.benches.rendering._rivals")
     name, flags = ffi.string(lib.tq_build()).decode().rsplit(", ", 1)
     words = f"{sysconfig.get_config_var('CFLAGS') or ''} {flags}".split()
     # Paths are of the computer on which Python was built, and say nothing of speed.

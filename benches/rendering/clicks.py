@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from benches.rendering.stability import FORMS, simulate
-from modeling import TextureModel, render_many
-from modeling.arrays import Floats
-from modeling.equalizer.bands import band_rms
-from modeling.hand import Hand
-from modeling.rendering.noise import stream_key, white_noise
+from tactileq.benches.rendering.stability import FORMS, simulate
+from tactileq.modeling import TextureModel, render_many
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.bands import band_rms
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.rendering.noise import stream_key, white_noise
 
 RATE_HZ = 5000.0
 CLICK_HZ = 1000.0

@@ -15,18 +15,18 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from benches.rendering.levels import System
-from modeling import ARModel, InputError, Spectrum, TextureModel
-from modeling.arrays import Floats
-from modeling.fitting.autoregressive import fit_filter
-from modeling.models.grid import Cells, within_grid
-from modeling.models.line_spectral import (
+from tactileq.benches.rendering.levels import System
+from tactileq.modeling import ARModel, InputError, Spectrum, TextureModel
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.fitting.autoregressive import fit_filter
+from tactileq.modeling.models.grid import Cells, within_grid
+from tactileq.modeling.models.line_spectral import (
     line_spectral_frequencies,
     prediction_coefficients,
     reflection_coefficients,
 )
-from modeling.models.parameter_table import ParameterTable, wide_enough
-from modeling.recordings.spectrum import smooth
+from tactileq.modeling.models.parameter_table import ParameterTable, wide_enough
+from tactileq.modeling.recordings.spectrum import smooth
 
 PARTS = (2, 4, 8)  # of a cell, among which the fewest are taken that are stable between nodes
 _WITHIN = np.array([0.25, 0.5, 0.75])  # of a cell, where stability is checked

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.equalizer.bands import band_response
-from modeling.rendering.noise import stream_key, white_noise
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.bands import band_response
+from tactileq.modeling.rendering.noise import stream_key, white_noise
 
 RATE_HZ = 5000.0
 CENTRE_HZ = 300.0

@@ -10,7 +10,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.page.drawing import (
+from tactileq.analysis.page.drawing import (
     BLACK,
     BLUE,
     GREEN,
@@ -23,7 +23,7 @@ from analysis.page.drawing import (
     finish_axes,
     shared_legend,
 )
-from benches.rendering.bench import (
+from tactileq.benches.rendering.bench import (
     BLOCKS,
     LFILTER,
     RENDERER,
@@ -32,7 +32,7 @@ from benches.rendering.bench import (
     UPDATES,
     RenderingBench,
 )
-from benches.rendering.rivals import AR, DIRECT_FORM_I, KERNEL, TPT, TRANSPOSED
+from tactileq.benches.rendering.rivals import AR, DIRECT_FORM_I, KERNEL, TPT, TRANSPOSED
 
 FILTER_COLOURS = {
     KERNEL: BLUE,

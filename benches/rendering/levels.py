@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.equalizer.bands import band_coefficients, clamp_bands
-from modeling.models.parameter_table import Parameters
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.bands import band_coefficients, clamp_bands
+from tactileq.modeling.models.parameter_table import Parameters
 
 
 class System(NamedTuple):

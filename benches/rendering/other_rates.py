@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modeling import PEQ
-from modeling.arrays import Floats
-from modeling.rendering.interpolation import interpolation
+from tactileq.modeling import PEQ
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.rendering.interpolation import interpolation
 
 # Midpoints of intervals: far below the width of any layer; above the model's band there are images.
 STEP_HZ = 0.5

@@ -11,17 +11,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.signal import lfilter, sosfilt
 
-from benches.rendering.coefficients import CoefficientTable
-from benches.rendering.stored_sounds import Grains, Loops
-from modeling import ARModel, InputError, Spectrum, TextureModel
-from modeling.arrays import Floats
-from modeling.errors import counted
-from modeling.fitting.autoregressive import fit_filter
-from modeling.models.line_spectral import line_spectral_frequencies
-from modeling.rendering.compiled import CompiledEngine, filled_texture
-from modeling.rendering.noise import stream_key
-from modeling.rendering.plan import LayeredModel, plan_for
-from stimuli.planted.textures import FORCES_N, SPEEDS_MM_S
+from tactileq.benches.rendering.coefficients import CoefficientTable
+from tactileq.benches.rendering.stored_sounds import Grains, Loops
+from tactileq.modeling import ARModel, InputError, Spectrum, TextureModel
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import counted
+from tactileq.modeling.fitting.autoregressive import fit_filter
+from tactileq.modeling.models.line_spectral import line_spectral_frequencies
+from tactileq.modeling.rendering.compiled import CompiledEngine, filled_texture
+from tactileq.modeling.rendering.noise import stream_key
+from tactileq.modeling.rendering.plan import LayeredModel, plan_for
+from tactileq.stimuli.planted.textures import FORCES_N, SPEEDS_MM_S
 
 RATE_HZ = 5000.0
 ORDER = 20
@@ -35,7 +35,7 @@ _SPECTRUM_SAMPLES = 5000
 
 
 def compiled_parts(name: str) -> tuple[Any, Any]:
-    """The cffi pair (ffi, lib) of `modeling.rendering._kernel` or `benches.rendering._rivals`.
+    """The cffi pair (ffi, lib) of `tactileq.modeling.rendering._kernel` or `tactileq.benches.rendering._rivals`.
 
     Raises
     ------
@@ -141,7 +141,7 @@ class CompiledStream:
         seed: int,
         rate_hz: float | None = None,
     ) -> None:
-        self._ffi, lib = compiled_parts("benches.rendering._rivals")
+        self._ffi, lib = compiled_parts("tactileq.benches.rendering._rivals")
         key = stream_key(seed)
         plan = plan_for(model.rate_hz, rate_hz=rate_hz, update_samples=update_samples)
         # Kept, because it owns what the texture points at.
@@ -201,7 +201,7 @@ class SoundStream:
     """
 
     def __init__(self, sounds: Loops | Grains, *, update_samples: int, seed: int) -> None:
-        self._ffi, lib = compiled_parts("benches.rendering._rivals")
+        self._ffi, lib = compiled_parts("tactileq.benches.rendering._rivals")
         plan = plan_for(sounds.rate_hz, update_samples=update_samples)
         self._texture, self._arrays = filled_texture(self._ffi, plan.texture(sounds), np.float64)
         samples = np.ascontiguousarray(sounds.samples)

@@ -11,9 +11,9 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.equalizer.bands import band_coefficients
-from modeling.models.parameter_table import Parameters
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.bands import band_coefficients
+from tactileq.modeling.models.parameter_table import Parameters
 
 RATE_HZ = 5000.0
 STROKE_HZ = 2.0

@@ -9,11 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from modeling.arrays import Floats
-from modeling.models.grid import Cells, Condition, fill_grid, grid_axes, within_grid
-from modeling.models.parameter_table import ParameterTable, wide_enough
-from modeling.recordings.recording import Recording
-from modeling.recordings.spectrum import MODEL_RATE_HZ, prepare
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.models.grid import Cells, Condition, fill_grid, grid_axes, within_grid
+from tactileq.modeling.models.parameter_table import ParameterTable, wide_enough
+from tactileq.modeling.recordings.recording import Recording
+from tactileq.modeling.recordings.spectrum import MODEL_RATE_HZ, prepare
 
 # From speed (mm/s), force (N) and (k,) frequencies in Hz to (k,) magnitudes in g per unit noise.
 Magnitude = Callable[[float, float, Floats], Floats]

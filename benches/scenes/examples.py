@@ -14,22 +14,22 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from analysis.columns import SIMULATED_COLUMN
-from analysis.page.sections import Mapped
-from analysis.textures.between import RIVAL_ORDER, Truth
-from benches.chart.rival_costs import coefficients_cost
-from benches.rendering.coefficients import CoefficientTable, tabled_predictor
-from modeling import ARModel, CompiledScene, Scene, TextureModel, fit_texture
-from modeling.files.columns import Column, names
-from modeling.fitting.autoregressive import fit_ar
-from modeling.rendering.cost import Cost
-from modeling.scenes.compiled import CompiledTexture
-from modeling.scenes.compiler import compile_scenes
-from modeling.scenes.cost import stored_numbers
-from modeling.scenes.measures import ComparedBand, Errors, errors_between
-from modeling.scenes.places import Places, enclosing, places_of
-from modeling.scenes.strokes import Windows, windows_kept
-from stimuli.planted.drawn import draw_surface
+from tactileq.analysis.columns import SIMULATED_COLUMN
+from tactileq.analysis.page.sections import Mapped
+from tactileq.analysis.textures.between import RIVAL_ORDER, Truth
+from tactileq.benches.chart.rival_costs import coefficients_cost
+from tactileq.benches.rendering.coefficients import CoefficientTable, tabled_predictor
+from tactileq.modeling import ARModel, CompiledScene, Scene, TextureModel, fit_texture
+from tactileq.modeling.files.columns import Column, names
+from tactileq.modeling.fitting.autoregressive import fit_ar
+from tactileq.modeling.rendering.cost import Cost
+from tactileq.modeling.scenes.compiled import CompiledTexture
+from tactileq.modeling.scenes.compiler import compile_scenes
+from tactileq.modeling.scenes.cost import stored_numbers
+from tactileq.modeling.scenes.measures import ComparedBand, Errors, errors_between
+from tactileq.modeling.scenes.places import Places, enclosing, places_of
+from tactileq.modeling.scenes.strokes import Windows, windows_kept
+from tactileq.stimuli.planted.drawn import draw_surface
 
 PLANTED_EXAMPLES = (
     *("full_range", "slow_light_touch", "vibrator_40_400_hz", "microcontroller_64_kb"),
@@ -75,7 +75,7 @@ class CompiledExample(NamedTuple):
 
 def example(name: str) -> Scene:
     """One of the scenes that ship."""
-    file = resources.files("modeling.scenes") / "shipped" / f"{name}.toml"
+    file = resources.files("tactileq.modeling.scenes") / "shipped" / f"{name}.toml"
     with resources.as_file(file) as path:
         return Scene.load(path)
 

@@ -6,18 +6,18 @@ from collections.abc import Callable, Mapping, Sequence
 
 import pandas as pd
 
-from analysis.labels import ALL_TEXTURES
-from analysis.page.outcomes import Outcome, described
-from analysis.page.page import Fold, Picture, Table
-from analysis.page.sections import Mapped, Section
-from analysis.spectra.figures.scenes import figure_tradeoff
-from analysis.textures.scenes import (
+from tactileq.analysis.labels import ALL_TEXTURES
+from tactileq.analysis.page.outcomes import Outcome, described
+from tactileq.analysis.page.page import Fold, Picture, Table
+from tactileq.analysis.page.sections import Mapped, Section
+from tactileq.analysis.spectra.figures.scenes import figure_tradeoff
+from tactileq.analysis.textures.scenes import (
     BEFORE_AFTER_COLUMNS,
     STEP_COLUMNS,
     before_after_table,
     steps_table,
 )
-from benches.scenes.examples import (
+from tactileq.benches.scenes.examples import (
     FULL_MODEL,
     LEAST,
     RIVAL,
@@ -26,9 +26,9 @@ from benches.scenes.examples import (
     Surface,
     comparison_table,
 )
-from modeling import CompiledScene
-from modeling.errors import counted
-from modeling.files.columns import Column, chosen
+from tactileq.modeling import CompiledScene
+from tactileq.modeling.errors import counted
+from tactileq.modeling.files.columns import Column, chosen
 
 SCENE = Column("scene", is_name=True)
 SCENE_TEXTURE_COLUMNS = (SCENE, *BEFORE_AFTER_COLUMNS)

@@ -13,8 +13,8 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.statistics.caveats import EQUALITY, SHOWN, Caveats
-from analysis.statistics.equivalence import (
+from tactileq.analysis.statistics.caveats import EQUALITY, SHOWN, Caveats
+from tactileq.analysis.statistics.equivalence import (
     ALL_BUT,
     ALPHA,
     AVERAGE_FELT,
@@ -24,15 +24,15 @@ from analysis.statistics.equivalence import (
     INCONCLUSIVE,
     one_sided_tests,
 )
-from analysis.statistics.participants.posterior import (
+from tactileq.analysis.statistics.participants.posterior import (
     Draws,
     Effort,
     choice_draws,
     rating_draws,
 )
-from analysis.statistics.participants.verdict import PeopleSummary, summary_of
-from benches.validation.people.held_out import HELD_OUT
-from benches.validation.people.situations import (
+from tactileq.analysis.statistics.participants.verdict import PeopleSummary, summary_of
+from tactileq.benches.validation.people.held_out import HELD_OUT
+from tactileq.benches.validation.people.situations import (
     CHOICE_KIND,
     ODDITY_KIND,
     RATING_KIND,
@@ -40,12 +40,12 @@ from benches.validation.people.situations import (
     DrawnStudies,
     Situation,
 )
-from modeling.arrays import Bools, Floats
-from modeling.checks import check_whole
-from modeling.files.columns import Column, names
-from modeling.participants.choices import ODDITY, ChoiceStudies, forced_choice
-from modeling.participants.ratings import RatingStudies
-from modeling.seeds import generator, number_of
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.checks import check_whole
+from tactileq.modeling.files.columns import Column, names
+from tactileq.modeling.participants.choices import ODDITY, ChoiceStudies, forced_choice
+from tactileq.modeling.participants.ratings import RatingStudies
+from tactileq.modeling.seeds import generator, number_of
 
 SIZES = (20, 36)
 FEW = 0.15

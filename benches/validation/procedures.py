@@ -15,20 +15,20 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import integrate, stats
 
-from analysis.chapters.confusions.information import information_bits, transferred_information
-from analysis.chapters.single_answers.gee import fit_gee
-from analysis.statistics.equivalence import ALPHA, Bounds, one_sided_tests
-from analysis.statistics.mixed import fit_mixed, t_of
-from analysis.statistics.paired import CONFIDENCE, d_z_interval, holm, sign_flips_p, t_tests
-from analysis.statistics.rates import clopper_pearson
-from benches.raters import (
+from tactileq.analysis.chapters.confusions.information import information_bits, transferred_information
+from tactileq.analysis.chapters.single_answers.gee import fit_gee
+from tactileq.analysis.statistics.equivalence import ALPHA, Bounds, one_sided_tests
+from tactileq.analysis.statistics.mixed import fit_mixed, t_of
+from tactileq.analysis.statistics.paired import CONFIDENCE, d_z_interval, holm, sign_flips_p, t_tests
+from tactileq.analysis.statistics.rates import clopper_pearson
+from tactileq.benches.raters import (
     HIGHEST,
     LOWEST,
     bootstrap_covers,
     covered,
     paired_power,
 )
-from benches.validation.worlds import (
+from tactileq.benches.validation.worlds import (
     DIFFERENCE_SD,
     LATENT,
     N_TEXTURES,
@@ -41,10 +41,10 @@ from benches.validation.worlds import (
     single_choices,
     single_ratings,
 )
-from modeling.arrays import Floats
-from modeling.checks import check_whole
-from modeling.files.columns import Column, names
-from modeling.seeds import generator, number_of
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import check_whole
+from tactileq.modeling.files.columns import Column, names
+from tactileq.modeling.seeds import generator, number_of
 
 SIZES = (8, 20, 36)  # participants
 BOUNDS: Bounds = (-7.5, 7.5)

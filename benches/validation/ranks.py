@@ -12,12 +12,12 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.statistics.participants.choices import ChoiceSampler, population_effects
-from analysis.statistics.participants.ratings import RatingSampler
-from modeling.arrays import Bools, Floats
-from modeling.checks import check_whole
-from modeling.files.columns import Column, names
-from modeling.participants.choices import (
+from tactileq.analysis.statistics.participants.choices import ChoiceSampler, population_effects
+from tactileq.analysis.statistics.participants.ratings import RatingSampler
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.checks import check_whole
+from tactileq.modeling.files.columns import Column, names
+from tactileq.modeling.participants.choices import (
     ODDITY,
     ChoicePriors,
     DecisionModel,
@@ -25,8 +25,8 @@ from modeling.participants.choices import (
     forced_choice,
     mean_effect,
 )
-from modeling.participants.ratings import RatingPriors, drawn_ratings
-from modeling.seeds import generator, number_of
+from tactileq.modeling.participants.ratings import RatingPriors, drawn_ratings
+from tactileq.modeling.seeds import generator, number_of
 
 BINS = 10
 PEOPLE, TEXTURES = 12, 4

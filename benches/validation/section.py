@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pandas as pd
 
-from analysis.page.page import Fold, Table
-from analysis.page.sections import Section
-from benches.validation.model import MODEL_COLUMNS
-from benches.validation.procedures import VALIDATION_COLUMNS
-from benches.validation.ranks import RANK_COLUMNS
+from tactileq.analysis.page.page import Fold, Table
+from tactileq.analysis.page.sections import Section
+from tactileq.benches.validation.model import MODEL_COLUMNS
+from tactileq.benches.validation.procedures import VALIDATION_COLUMNS
+from tactileq.benches.validation.ranks import RANK_COLUMNS
 
 NOTE = (
     "Each row: simulated studies with n participants in which the truth is planted; how often the "
@@ -43,7 +43,7 @@ def validation_section(table: pd.DataFrame, of_model: pd.DataFrame, ranks: pd.Da
     Parameters
     ----------
     table : DataFrame
-        From `benches.validation.procedures.validation_table`.
+        From `tactileq.benches.validation.procedures.validation_table`.
     of_model : DataFrame
         From `validation_model.model_table`.
     ranks : DataFrame

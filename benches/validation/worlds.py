@@ -10,12 +10,12 @@ from math import sqrt
 
 import numpy as np
 
-from benches.raters import (
+from tactileq.benches.raters import (
     at_random,
     ended,
     mean_at_the_end,
 )
-from modeling.arrays import Floats
+from tactileq.modeling.arrays import Floats
 
 DIFFERENCE_SD = 11.0  # of participants' differences, in points; 7.5 are 0.68 of it
 PERSON_SD = 6.0  # of participants' means

@@ -9,8 +9,8 @@ from collections import defaultdict
 from dataclasses import replace
 from pathlib import Path
 
-from experiments.study.study import Study
-from experiments.tasks.balance import balance_of
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.tasks.balance import balance_of
 
 SEEDS = range(200)
 

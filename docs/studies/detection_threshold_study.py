@@ -1,7 +1,7 @@
 """How well planted detection thresholds are recovered, by trials, compared with a staircase.
 
 Simulated: observers with random smooth thresholds at the eight frequencies of the task answer as
-`experiments.tasks.threshold` asks (QUEST+), and as a 3-down 1-up staircase of PsychoPy asks.
+`tactileq.experiments.tasks.threshold` asks (QUEST+), and as a 3-down 1-up staircase of PsychoPy asks.
 
 Example: python docs/studies/detection_threshold_study.py writes detection_threshold_study.tsv and
 .png beside this file and prints the table.
@@ -20,10 +20,10 @@ import pandas as pd
 from joblib import Parallel, delayed
 from matplotlib.figure import Figure
 
-from analysis.page.drawing import finish_axes, shared_legend
-from analysis.page.drawing import stamp_if_simulated as stamp
-from experiments.tasks.threshold import FREQUENCIES_HZ
-from experiments.tasks.threshold_posterior import POINT_DB, Answer, estimate, next_level_db
+from tactileq.analysis.page.drawing import finish_axes, shared_legend
+from tactileq.analysis.page.drawing import stamp_if_simulated as stamp
+from tactileq.experiments.tasks.threshold import FREQUENCIES_HZ
+from tactileq.experiments.tasks.threshold_posterior import POINT_DB, Answer, estimate, next_level_db
 
 OBSERVERS = 6  # of each kind
 TRIALS = (20, 30, 40, 50, 60)

@@ -32,12 +32,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from modeling.seeds import generator
-from rig.desk.desk_rig import DeskRig
-from rig.hand.serial_line import SensorLine, encode
-from rig.live.clock import now_s
-from rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling.seeds import generator
+from tactileq.rig.desk.desk_rig import DeskRig
+from tactileq.rig.hand.serial_line import SensorLine, encode
+from tactileq.rig.live.clock import now_s
+from tactileq.rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
+from tactileq.stimuli.planted.textures import planted_texture
 
 RATE_HZ, BLOCK = 48000, 128
 BLOCK_S = BLOCK / RATE_HZ

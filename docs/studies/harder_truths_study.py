@@ -1,6 +1,6 @@
 """How `joint` performs on textures more difficult than sums of layers on white noise.
 
-Simulated: random layers whose places are known (`stimuli.planted.spectra`), over 2 × 2 conditions
+Simulated: random layers whose places are known (`tactileq.stimuli.planted.spectra`), over 2 × 2 conditions
 of one level each, with difficulties met in laboratories: coloured floors, mains hum, a pure tone,
 many layers, short and long records, a turntable that slows down, a level that changes.
 
@@ -19,12 +19,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.textures.recovery import match_layers
-from modeling import PEQ, Recording, RecordingSet, fit_texture
-from modeling.arrays import Floats
-from modeling.models.own_peaks import own_peaks
-from modeling.threads import one_linear_algebra_thread
-from stimuli.planted.spectra import NOISE_GAIN, RATE_HZ, RandomTruth, random_truth
+from tactileq.analysis.textures.recovery import match_layers
+from tactileq.modeling import PEQ, Recording, RecordingSet, fit_texture
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.models.own_peaks import own_peaks
+from tactileq.modeling.threads import one_linear_algebra_thread
+from tactileq.stimuli.planted.spectra import NOISE_GAIN, RATE_HZ, RandomTruth, random_truth
 
 TEXTURES = 40
 CONDITIONS = ((100.0, 1.0), (100.0, 2.0), (200.0, 1.0), (200.0, 2.0))

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 import sounddevice
 
-from modeling.rendering.limits import Limits
-from rig.live.clock import now_s
-from rig.live.memory import Live
-from rig.sound.output import SoundOutput
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.rig.live.clock import now_s
+from tactileq.rig.live.memory import Live
+from tactileq.rig.sound.output import SoundOutput
+from tactileq.stimuli.planted.textures import planted_texture
 
 RATE_HZ, BLOCK = 48000, 128
 REST_S, STROKE_S = 0.12, 0.05

@@ -1,7 +1,7 @@
 """How close models of real surfaces are at the recorded conditions, and between them.
 
 Simulated: random surfaces with the statistics of 100 real ones and no layers of their own
-(`stimuli.planted.drawn`), whose spectra are known at every speed and force.
+(`tactileq.stimuli.planted.drawn`), whose spectra are known at every speed and force.
 
 Example: python docs/studies/real_surfaces_study.py writes real_surfaces_study*.tsv and .png beside
 this file and prints the tables.
@@ -20,20 +20,20 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.page.drawing import (
+from tactileq.analysis.page.drawing import (
     LAYER_COLOURS,
     LAYER_MARKERS,
     finish_axes,
     shared_legend,
 )
-from analysis.page.drawing import stamp_if_simulated as stamp
-from analysis.textures.between import FilterAt, halfway, truth_summary
-from modeling import Recording, RecordingSet, fit_ar, fit_texture
-from modeling.arrays import Floats
-from modeling.fitting.spectral_field import fit_spectral_field
-from modeling.models.grid import Condition
-from modeling.threads import one_linear_algebra_thread
-from stimuli.planted.drawn import FORCES_N, SPEEDS_MM_S, DrawnSurface, alter_surface, draw_surface
+from tactileq.analysis.page.drawing import stamp_if_simulated as stamp
+from tactileq.analysis.textures.between import FilterAt, halfway, truth_summary
+from tactileq.modeling import Recording, RecordingSet, fit_ar, fit_texture
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.fitting.spectral_field import fit_spectral_field
+from tactileq.modeling.models.grid import Condition
+from tactileq.modeling.threads import one_linear_algebra_thread
+from tactileq.stimuli.planted.drawn import FORCES_N, SPEEDS_MM_S, DrawnSurface, alter_surface, draw_surface
 
 SURFACES = 40
 FIRST = 1000  # surfaces that no constant of the estimator was chosen by

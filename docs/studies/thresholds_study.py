@@ -15,15 +15,15 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.page.drawing import (
+from tactileq.analysis.page.drawing import (
     LAYER_COLOURS,
     LAYER_MARKERS,
     finish_axes,
     shared_legend,
 )
-from analysis.page.drawing import stamp_if_simulated as stamp
-from modeling import CRITERIA, TextureModel, Threshold, simplify
-from modeling.perception.thresholds import SHIPPED
+from tactileq.analysis.page.drawing import stamp_if_simulated as stamp
+from tactileq.modeling import CRITERIA, TextureModel, Threshold, simplify
+from tactileq.modeling.perception.thresholds import SHIPPED
 
 TEXTURES = 100
 RATE_HZ = 5000.0

@@ -9,15 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from types import TracebackType
 
-from experiments.console import intake_pages, trial_pages
-from experiments.console.languages import Texts
-from experiments.console.page_runner import PageHook, PageRunner
-from experiments.console.screens import open_window
-from experiments.sessions.people import Choice, ChoiceTrial, Intake, RatedTrial, Rating
-from experiments.sessions.surfaces import Note, Surfaces
-from experiments.sessions.task import Task
-from experiments.study.study import TASKS
-from experiments.tasks import task_named
+from tactileq.experiments.console import intake_pages, trial_pages
+from tactileq.experiments.console.languages import Texts
+from tactileq.experiments.console.page_runner import PageHook, PageRunner
+from tactileq.experiments.console.screens import open_window
+from tactileq.experiments.sessions.people import Choice, ChoiceTrial, Intake, RatedTrial, Rating
+from tactileq.experiments.sessions.surfaces import Note, Surfaces
+from tactileq.experiments.sessions.task import Task
+from tactileq.experiments.study.study import TASKS
+from tactileq.experiments.tasks import task_named
 
 
 class Console:
@@ -29,7 +29,7 @@ class Console:
     Parameters
     ----------
     language : str
-        One of `experiments.console.languages.languages()`.
+        One of `tactileq.experiments.console.languages.languages()`.
     stamp : str
         What every page is marked with, such as "pilot, simulated rig"; empty for none.
     size : (int, int)

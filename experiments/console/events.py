@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal, NamedTuple
 
-from experiments.console.drawing import Point
+from tactileq.experiments.console.drawing import Point
 
 EventKind = Literal["press", "drag", "release"]
 LEFT_BUTTON = 1

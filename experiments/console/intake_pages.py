@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from functools import partial
 
-from experiments.console.drawing import CARD, CONSOLE_GREY, CONSOLE_ORANGE, PALE, text
-from experiments.console.page_runner import PageRunner
-from experiments.console.widgets import Button
-from experiments.sessions.people import Intake, SessionAborted
-from experiments.study.questions import MOST_DIGITS, MOST_LEVELS, Question
+from tactileq.experiments.console.drawing import CARD, CONSOLE_GREY, CONSOLE_ORANGE, PALE, text
+from tactileq.experiments.console.page_runner import PageRunner
+from tactileq.experiments.console.widgets import Button
+from tactileq.experiments.sessions.people import Intake, SessionAborted
+from tactileq.experiments.study.questions import MOST_DIGITS, MOST_LEVELS, Question
 
 REFUSED = "consent refused"
 ANOTHER = "the code is another person's"

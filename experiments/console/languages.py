@@ -8,11 +8,11 @@ from pathlib import Path
 from string import Formatter
 from typing import Any
 
-from experiments.study.questions import Question
-from experiments.study.study import Study
-from modeling import InputError
-from modeling.errors import shown
-from modeling.files.documents import read_toml
+from tactileq.experiments.study.questions import Question
+from tactileq.experiments.study.study import Study
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.documents import read_toml
 
 FOLDER = Path(__file__).with_name("texts")
 COMPLETE = "en"  # the language of which every other one has the keys

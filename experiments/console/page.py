@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from experiments.console.drawing import Point
-from experiments.console.events import EventKind, KeyPress
-from experiments.console.widgets import Button, FocusRing, Widget
+from tactileq.experiments.console.drawing import Point
+from tactileq.experiments.console.events import EventKind, KeyPress
+from tactileq.experiments.console.widgets import Button, FocusRing, Widget
 
 
 class Page:

@@ -7,14 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from experiments.console.drawing import CONSOLE_ORANGE
-from experiments.console.events import KeyPress, Keys, Mouse
-from experiments.console.languages import Texts
-from experiments.console.page import Page
-from experiments.console.parts import PageParts
-from experiments.console.widgets import Button, FocusRing, Widget
-from experiments.sessions.people import SessionAborted
-from experiments.sessions.surfaces import Note, Surfaces
+from tactileq.experiments.console.drawing import CONSOLE_ORANGE
+from tactileq.experiments.console.events import KeyPress, Keys, Mouse
+from tactileq.experiments.console.languages import Texts
+from tactileq.experiments.console.page import Page
+from tactileq.experiments.console.parts import PageParts
+from tactileq.experiments.console.widgets import Button, FocusRing, Widget
+from tactileq.experiments.sessions.people import SessionAborted
+from tactileq.experiments.sessions.surfaces import Note, Surfaces
 
 # --- Parameters -----------------------------------------------------------------------------
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from experiments.console.drawing import (
+from tactileq.experiments.console.drawing import (
     BLUE,
     CONSOLE_GREY,
     CONSOLE_ORANGE,
@@ -18,8 +18,8 @@ from experiments.console.drawing import (
     fitted,
     text,
 )
-from experiments.console.languages import Texts
-from experiments.console.widgets import Button
+from tactileq.experiments.console.languages import Texts
+from tactileq.experiments.console.widgets import Button
 
 # --- Parameters -----------------------------------------------------------------------------
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-from experiments.console.drawing import PAPER
-from modeling import InputError
-from modeling.extras import extra
+from tactileq.experiments.console.drawing import PAPER
+from tactileq.modeling import InputError
+from tactileq.modeling.extras import extra
 
 
 def open_window(*, size: tuple[int, int], fullscreen: bool, screen: int) -> Any:

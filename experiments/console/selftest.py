@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.console.screens import open_window
-from experiments.sessions.surfaces import present
-from modeling import InputError
-from rig.interface import Presentable, TextureRig
+from tactileq.experiments.console.screens import open_window
+from tactileq.experiments.sessions.surfaces import present
+from tactileq.modeling import InputError
+from tactileq.rig.interface import Presentable, TextureRig
 
 FLIPS = 240
 PRESSES = 20

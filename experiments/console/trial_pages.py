@@ -6,12 +6,12 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from experiments.console.drawing import CONSOLE_ORANGE, INK, SMALL_HEIGHT, Point
-from experiments.console.page_runner import PageRunner
-from experiments.console.widgets import Button, RatingScale
-from experiments.sessions.people import Choice, RatedTrial, Rating
-from experiments.sessions.surfaces import Surfaces
-from experiments.sessions.task import Task
+from tactileq.experiments.console.drawing import CONSOLE_ORANGE, INK, SMALL_HEIGHT, Point
+from tactileq.experiments.console.page_runner import PageRunner
+from tactileq.experiments.console.widgets import Button, RatingScale
+from tactileq.experiments.sessions.people import Choice, RatedTrial, Rating
+from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.sessions.task import Task
 
 BUTTONS_PER_ROW = 7
 BUTTON_PITCH, ROW_PITCH = 0.15, 0.18

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from experiments.console.drawing import (
+from tactileq.experiments.console.drawing import (
     BLUE,
     CARD,
     CONSOLE_GREY,
@@ -24,7 +24,7 @@ from experiments.console.drawing import (
     rounded,
     text,
 )
-from experiments.console.events import KeyPress
+from tactileq.experiments.console.events import KeyPress
 
 PRESSING = ("enter", "space")
 # How far a key moves a marker, in points; with shift, ten times as far.

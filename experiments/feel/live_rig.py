@@ -7,17 +7,17 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from experiments.feel.rigs import NO_HAND, HandNow, OutputNow
-from modeling import InputError
-from modeling.models.loading import Layered
-from modeling.rendering.plan import RenderCounters
-from rig.force.hand import ForceHand
-from rig.force.wall import Wall
-from rig.hand.reader import HandReader
-from rig.live.clock import now_s
-from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, OLDEST_READING_S, Live
-from rig.sound.supervision import SoundLost
-from rig.sound.vibration import VibrationOutput
+from tactileq.experiments.feel.rigs import NO_HAND, HandNow, OutputNow
+from tactileq.modeling import InputError
+from tactileq.modeling.models.loading import Layered
+from tactileq.modeling.rendering.plan import RenderCounters
+from tactileq.rig.force.hand import ForceHand
+from tactileq.rig.force.wall import Wall
+from tactileq.rig.hand.reader import HandReader
+from tactileq.rig.live.clock import now_s
+from tactileq.rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, OLDEST_READING_S, Live
+from tactileq.rig.sound.supervision import SoundLost
+from tactileq.rig.sound.vibration import VibrationOutput
 
 LEVEL_S = 0.25
 MASKING_LEVEL = 0.1  # RMS, share of full scale
@@ -25,7 +25,7 @@ _LIMITS = {"peak": "limited_peak", "RMS": "limited_rms", "duration": "limited_du
 
 
 class LiveRig:
-    """Hand and sound of a rig, both open, as `experiments.feel.rigs.FeltRig` wants them.
+    """Hand and sound of a rig, both open, as `tactileq.experiments.feel.rigs.FeltRig` wants them.
 
     Parameters
     ----------

@@ -7,20 +7,20 @@ from contextlib import ExitStack, contextmanager
 from math import inf
 from pathlib import Path
 
-from experiments.feel.live_rig import MASKING_LEVEL, LiveRig
-from experiments.feel.view import short
-from modeling import Compensation, InputError, Limits, Vibrator, compensation_for
-from rig.desk.checks import HIGHEST_LATENCY_MS
-from rig.desk.lock import rig_locked
-from rig.desk.parts import hand_reader, vibration_output
-from rig.desk.walls import Walls, check_walls, usual_wall
-from rig.hand.reader import HandReader
-from rig.hand.settings import HandSettings
-from rig.live.memory import Live
-from rig.setup.rig_file import RigFile
-from rig.sound.devices import SoundDevice, find_device
-from rig.sound.output import SoundOutput
-from rig.sound.supervision import SoundLost
+from tactileq.experiments.feel.live_rig import MASKING_LEVEL, LiveRig
+from tactileq.experiments.feel.view import short
+from tactileq.modeling import Compensation, InputError, Limits, Vibrator, compensation_for
+from tactileq.rig.desk.checks import HIGHEST_LATENCY_MS
+from tactileq.rig.desk.lock import rig_locked
+from tactileq.rig.desk.parts import hand_reader, vibration_output
+from tactileq.rig.desk.walls import Walls, check_walls, usual_wall
+from tactileq.rig.hand.reader import HandReader
+from tactileq.rig.hand.settings import HandSettings
+from tactileq.rig.live.memory import Live
+from tactileq.rig.setup.rig_file import RigFile
+from tactileq.rig.sound.devices import SoundDevice, find_device
+from tactileq.rig.sound.output import SoundOutput
+from tactileq.rig.sound.supervision import SoundLost
 
 BLOCK = 256
 PIXELS_PER_MM = 3.78  # of a screen with 96 dots per inch

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from experiments.console.drawing import BLUE, CONSOLE_GREY, CONSOLE_ORANGE, INK, text
-from experiments.feel.plots import (
+from tactileq.experiments.console.drawing import BLUE, CONSOLE_GREY, CONSOLE_ORANGE, INK, text
+from tactileq.experiments.feel.plots import (
     PIXELS,
     TICK_HEIGHT,
     Axes,
@@ -19,9 +19,9 @@ from experiments.feel.plots import (
     line,
     panel_card,
 )
-from experiments.feel.rigs import HandNow
-from experiments.feel.textures import Texture
-from experiments.feel.view import (
+from tactileq.experiments.feel.rigs import HandNow
+from tactileq.experiments.feel.textures import Texture
+from tactileq.experiments.feel.view import (
     FeltCriterion,
     FeltLayers,
     ModelNow,
@@ -31,7 +31,7 @@ from experiments.feel.view import (
     level_words,
     short,
 )
-from modeling.errors import counted
+from tactileq.modeling.errors import counted
 
 Box = tuple[float, float, float, float]
 

@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from experiments.console.drawing import CARD, CONSOLE_GREY, INK, PALE, Point, card, text
-from modeling.arrays import Floats
+from tactileq.experiments.console.drawing import CARD, CONSOLE_GREY, INK, PALE, Point, card, text
+from tactileq.modeling.arrays import Floats
 
 TICK_HEIGHT = 0.019
 TICK_GAP = 0.008

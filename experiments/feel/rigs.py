@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from modeling.models.loading import Layered
+from tactileq.modeling.models.loading import Layered
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from modeling.errors import InputError, shown
-from modeling.models.ar_model import ARModel
-from modeling.models.loading import Layered, load_model, models_in
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.models.ar_model import ARModel
+from tactileq.modeling.models.loading import Layered, load_model, models_in
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -12,16 +12,16 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from experiments.feel.rigs import HandNow, OutputNow
-from experiments.feel.textures import Texture
-from modeling.arrays import Bools, Floats
-from modeling.equalizer.peq import PEQ
-from modeling.errors import counted
-from modeling.models.loading import Layered
-from modeling.perception.amplitudes import layer_amplitudes_g
-from modeling.perception.by_power import changes_alone
-from modeling.perception.thresholds import Threshold
-from modeling.perception.verdicts import CriterionName
+from tactileq.experiments.feel.rigs import HandNow, OutputNow
+from tactileq.experiments.feel.textures import Texture
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.equalizer.peq import PEQ
+from tactileq.modeling.errors import counted
+from tactileq.modeling.models.loading import Layered
+from tactileq.modeling.perception.amplitudes import layer_amplitudes_g
+from tactileq.modeling.perception.by_power import changes_alone
+from tactileq.modeling.perception.thresholds import Threshold
+from tactileq.modeling.perception.verdicts import CriterionName
 
 LOWEST_HZ = 10.0
 HIGHEST_SHARE = 0.98  # of the Nyquist frequency
@@ -76,7 +76,7 @@ class Now(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class FeltCriterion:
-    """The criterion for whether a layer is felt, as in `modeling.simplify`."""
+    """The criterion for whether a layer is felt, as in `tactileq.modeling.simplify`."""
 
     threshold: Threshold
     criterion: CriterionName = "energy"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from experiments.feel.rigs import FeltRig
-from experiments.feel.textures import Texture
+from tactileq.experiments.feel.rigs import FeltRig
+from tactileq.experiments.feel.textures import Texture
 
 
 class Visit:

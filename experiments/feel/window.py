@@ -10,14 +10,14 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from experiments.console.drawing import BLUE, CONSOLE_GREY, CONSOLE_ORANGE, text
-from experiments.console.events import Mouse
-from experiments.console.page import Page
-from experiments.console.screens import open_window
-from experiments.console.widgets import Button
-from experiments.feel.panels import HandPanel, LayerPanel, Layout, SpectrumPlot, layout_for
-from experiments.feel.plots import TICK_HEIGHT, CachedPicture, LiveText, panel_card
-from experiments.feel.view import (
+from tactileq.experiments.console.drawing import BLUE, CONSOLE_GREY, CONSOLE_ORANGE, text
+from tactileq.experiments.console.events import Mouse
+from tactileq.experiments.console.page import Page
+from tactileq.experiments.console.screens import open_window
+from tactileq.experiments.console.widgets import Button
+from tactileq.experiments.feel.panels import HandPanel, LayerPanel, Layout, SpectrumPlot, layout_for
+from tactileq.experiments.feel.plots import TICK_HEIGHT, CachedPicture, LiveText, panel_card
+from tactileq.experiments.feel.view import (
     HIGHEST_SHARE,
     PLACE_WORDS,
     FeltCriterion,
@@ -30,7 +30,7 @@ from experiments.feel.view import (
     spectrum_range,
     texture_now,
 )
-from experiments.feel.visit import Visit
+from tactileq.experiments.feel.visit import Visit
 
 FRAME_S = 1 / 40  # the drawing takes no more of the processor than it needs
 POINTER_S = 0.005

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from experiments.sessions.people import ProgressReport
+from tactileq.experiments.sessions.people import ProgressReport
 
 
 class SimulatedExperimenter:

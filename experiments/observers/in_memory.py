@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
-from experiments.observers.experimenter import SimulatedExperimenter
-from experiments.observers.percepts import Perception
-from experiments.observers.psychometrics import Psychometrics
-from experiments.observers.simulated import SimulatedParticipant, occasion_of, require_plantable
-from experiments.sessions.order import draw_session
-from experiments.sessions.store import MemoryStore
-from experiments.sessions.trial_loop import People, run_trials
-from experiments.study.models import ModelSets
-from experiments.study.study import Study
-from experiments.tasks import task_named
-from modeling.checks import check_whole
-from modeling.models.loading import AnyModel
-from rig.interface import HandRows, PresentationRecord, RigReading, Stimulus, ToneBurst
-from rig.twin import SimulatedRig
+from tactileq.experiments.observers.experimenter import SimulatedExperimenter
+from tactileq.experiments.observers.percepts import Perception
+from tactileq.experiments.observers.psychometrics import Psychometrics
+from tactileq.experiments.observers.simulated import SimulatedParticipant, occasion_of, require_plantable
+from tactileq.experiments.sessions.order import draw_session
+from tactileq.experiments.sessions.store import MemoryStore
+from tactileq.experiments.sessions.trial_loop import People, run_trials
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.tasks import task_named
+from tactileq.modeling.checks import check_whole
+from tactileq.modeling.models.loading import AnyModel
+from tactileq.rig.interface import HandRows, PresentationRecord, RigReading, Stimulus, ToneBurst
+from tactileq.rig.twin import SimulatedRig
 
 Row = dict[str, object]
 Occasion = tuple[str, int, int]  # task, subject, session

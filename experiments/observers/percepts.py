@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.study.models import ModelSets
-from experiments.study.study import Study
-from modeling import InputError, Threshold
-from modeling.arrays import Floats
-from modeling.errors import shown
-from modeling.models.ar_model import ARModel
-from modeling.models.loading import AnyModel
-from rig.interface import Presentable, Stimulus
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.study import Study
+from tactileq.modeling import InputError, Threshold
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import shown
+from tactileq.modeling.models.ar_model import ARModel
+from tactileq.modeling.models.loading import AnyModel
+from tactileq.rig.interface import Presentable, Stimulus
 
 BAND_EDGES_HZ = (10.0, 20.0, 35.0, 60.0, 90.0, 130.0, 180.0, 250.0, 350.0, 480.0)
 STROKES = ((100.0, 1.0), (200.0, 1.5), (300.0, 2.5))  # (mm/s, N)

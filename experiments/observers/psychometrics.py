@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from experiments.study.study import MOST_TEXTURES
-from modeling import InputError
-from modeling.arrays import Floats
-from modeling.checks import check_keys, check_number
-from modeling.errors import shown
-from modeling.participants.ratings import RatingPriors, careless_sds
+from tactileq.experiments.study.study import MOST_TEXTURES
+from tactileq.modeling import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import check_keys, check_number
+from tactileq.modeling.errors import shown
+from tactileq.modeling.participants.ratings import RatingPriors, careless_sds
 
 RATED_SCALES = ("magnitude_similarity", "frequency_similarity")
 EFFECTS = (*RATED_SCALES, "choice")
@@ -131,7 +131,7 @@ class Psychometrics:
         Distance at which a judgement has fallen to best_rating/e.
     noise_sd : float
         SD of judgements from trial to trial, in points; ratings are judgements censored at the ends
-        of the scale (`modeling.participants.ratings`).
+        of the scale (`tactileq.modeling.participants.ratings`).
     temperature_db : float
         τ: distance that makes a surface e times less likely to be chosen; the noise of percepts in
         the oddity task.

@@ -12,23 +12,23 @@ from math import expm1, hypot, isnan, log, log10, sqrt
 
 import numpy as np
 
-from experiments.observers.percepts import Perception
-from experiments.observers.psychometrics import (
+from tactileq.experiments.observers.percepts import Perception
+from tactileq.experiments.observers.psychometrics import (
     EFFECTS,
     RATED_SCALES,
     Psychometrics,
     choice_shares,
     with_effect,
 )
-from experiments.sessions.people import Choice, ChoiceTrial, Intake, RatedTrial, Rating
-from experiments.sessions.surfaces import Note, Surfaces
-from experiments.study.questions import Question
-from experiments.study.study import TASKS
-from experiments.tasks.oddity import OddityTrial
-from experiments.tasks.threshold import ThresholdTrial
-from modeling import InputError
-from modeling.participants.ratings import censored, lapsed_ratings
-from modeling.seeds import generator
+from tactileq.experiments.sessions.people import Choice, ChoiceTrial, Intake, RatedTrial, Rating
+from tactileq.experiments.sessions.surfaces import Note, Surfaces
+from tactileq.experiments.study.questions import Question
+from tactileq.experiments.study.study import TASKS
+from tactileq.experiments.tasks.oddity import OddityTrial
+from tactileq.experiments.tasks.threshold import ThresholdTrial
+from tactileq.modeling import InputError
+from tactileq.modeling.participants.ratings import censored, lapsed_ratings
+from tactileq.modeling.seeds import generator
 
 MEDIAN_TIME_S = 20.0
 DETECTION_SLOPE = 2.2  # Weibull's, of amplitudes
@@ -220,7 +220,7 @@ class SimulatedParticipant:
         """The button whose percept, with noise, is farthest from those of the other two.
 
         Without preferences and lapses its share of right answers is
-        `modeling.participants.choices.oddity_share` of the distance divided by the noise.
+        `tactileq.modeling.participants.choices.oddity_share` of the distance divided by the noise.
         """
         liked = self._liked(trial)
         if self._rng.random() < self.person.blind_rate:

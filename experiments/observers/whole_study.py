@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from experiments.observers.experimenter import SimulatedExperimenter
-from experiments.observers.percepts import Perception
-from experiments.observers.psychometrics import Psychometrics
-from experiments.observers.simulated import SimulatedParticipant, occasion_of, require_plantable
-from experiments.sessions.bids import export_all
-from experiments.sessions.running import Circumstances, run_session
-from experiments.sessions.trial_loop import People, SessionResult
-from experiments.study.models import ModelSets
-from experiments.study.study import Study
-from experiments.tasks import task_named
-from modeling import TextureModel, Threshold
-from modeling.checks import check_whole
-from rig.interface import TextureRig
+from tactileq.experiments.observers.experimenter import SimulatedExperimenter
+from tactileq.experiments.observers.percepts import Perception
+from tactileq.experiments.observers.psychometrics import Psychometrics
+from tactileq.experiments.observers.simulated import SimulatedParticipant, occasion_of, require_plantable
+from tactileq.experiments.sessions.bids import export_all
+from tactileq.experiments.sessions.running import Circumstances, run_session
+from tactileq.experiments.sessions.trial_loop import People, SessionResult
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.tasks import task_named
+from tactileq.modeling import TextureModel, Threshold
+from tactileq.modeling.checks import check_whole
+from tactileq.rig.interface import TextureRig
 
 Progress = Callable[[int, int, str], None]
 

@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.sessions.files import sessions_in
-from experiments.sessions.stored_sessions import held_session
-from experiments.sessions.trace_rows import hand_rows, presentation_rows
-from experiments.sessions.traces import HAND_COLUMNS
-from modeling import InputError, Renderer
-from modeling.arrays import Floats
-from modeling.errors import shown
-from modeling.files.columns import names
-from modeling.models.loading import AnyModel
+from tactileq.experiments.sessions.files import sessions_in
+from tactileq.experiments.sessions.stored_sessions import held_session
+from tactileq.experiments.sessions.trace_rows import hand_rows, presentation_rows
+from tactileq.experiments.sessions.traces import HAND_COLUMNS
+from tactileq.modeling import InputError, Renderer
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.columns import names
+from tactileq.modeling.models.loading import AnyModel
 
 FEWEST_READINGS = 2
 

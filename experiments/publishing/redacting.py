@@ -12,16 +12,16 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from experiments.sessions.bids import export_all
-from experiments.sessions.data_set import DESCRIPTION_NAME
-from experiments.sessions.log import Event, object_of, sealed_line, utc_text
-from experiments.sessions.roster import Roster, sealed_roster_line
-from experiments.sessions.stored_sessions import StoredSession, held_sessions
-from modeling import InputError
-from modeling.files.documents import dump_json, read_json_object
-from modeling.files.hashes import sha256_of_paths
-from modeling.files.reading import read_bytes
-from modeling.files.writing import write_bytes, write_text
+from tactileq.experiments.sessions.bids import export_all
+from tactileq.experiments.sessions.data_set import DESCRIPTION_NAME
+from tactileq.experiments.sessions.log import Event, object_of, sealed_line, utc_text
+from tactileq.experiments.sessions.roster import Roster, sealed_roster_line
+from tactileq.experiments.sessions.stored_sessions import StoredSession, held_sessions
+from tactileq.modeling import InputError
+from tactileq.modeling.files.documents import dump_json, read_json_object
+from tactileq.modeling.files.hashes import sha256_of_paths
+from tactileq.modeling.files.reading import read_bytes
+from tactileq.modeling.files.writing import write_bytes, write_text
 
 # When everybody's first session begins; others of the day follow after ten minutes each. At noon,
 # so that a reader's time zone does not make another day of it.

@@ -8,13 +8,13 @@ from __future__ import annotations
 from dataclasses import replace
 from datetime import date, datetime
 
-from experiments.sessions.data_set import claim_data_set
-from experiments.sessions.files import SessionFiles
-from experiments.sessions.log import now_utc
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.overrides import Overrides
-from experiments.sessions.state import session_state
-from modeling import InputError
+from tactileq.experiments.sessions.data_set import claim_data_set
+from tactileq.experiments.sessions.files import SessionFiles
+from tactileq.experiments.sessions.log import now_utc
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.overrides import Overrides
+from tactileq.experiments.sessions.state import session_state
+from tactileq.modeling import InputError
 
 _AGAIN = {
     "running": "another console runs it now; wait for its end",

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from experiments.sessions.resume import Resumption
-from experiments.study.design import Trial
+from tactileq.experiments.sessions.resume import Resumption
+from tactileq.experiments.study.design import Trial
 
 
 @dataclass(frozen=True, kw_only=True)

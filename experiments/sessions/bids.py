@@ -10,13 +10,13 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from experiments.sessions.bids_people import people_files, people_there, readme
-from experiments.sessions.bids_session import Made, session_files
-from experiments.sessions.bids_tables import json_bytes
-from experiments.sessions.data_set import DESCRIPTION_NAME, describe_data_set
-from experiments.sessions.files import SessionFiles, sessions_in
-from experiments.sessions.roster import Roster
-from experiments.sessions.stored_sessions import (
+from tactileq.experiments.sessions.bids_people import people_files, people_there, readme
+from tactileq.experiments.sessions.bids_session import Made, session_files
+from tactileq.experiments.sessions.bids_tables import json_bytes
+from tactileq.experiments.sessions.data_set import DESCRIPTION_NAME, describe_data_set
+from tactileq.experiments.sessions.files import SessionFiles, sessions_in
+from tactileq.experiments.sessions.roster import Roster
+from tactileq.experiments.sessions.stored_sessions import (
     Damaged,
     StoredSession,
     held_of,
@@ -24,11 +24,11 @@ from experiments.sessions.stored_sessions import (
     held_sessions,
     participants_of,
 )
-from modeling import InputError
-from modeling.errors import counted, shortened
-from modeling.files.documents import read_json_object
-from modeling.files.reading import LONGEST_PATH
-from modeling.files.writing import write_files
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import counted, shortened
+from tactileq.modeling.files.documents import read_json_object
+from tactileq.modeling.files.reading import LONGEST_PATH
+from tactileq.modeling.files.writing import write_files
 
 
 @dataclass(frozen=True, kw_only=True)

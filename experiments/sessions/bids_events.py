@@ -9,10 +9,10 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from math import inf
 
-from experiments.sessions.log import OWN_FIELDS, Event
-from experiments.sessions.traces import PRESENTATION_COLUMNS
-from modeling.files.answer_tables import ENDS
-from modeling.files.columns import Column, names, without
+from tactileq.experiments.sessions.log import OWN_FIELDS, Event
+from tactileq.experiments.sessions.traces import PRESENTATION_COLUMNS
+from tactileq.modeling.files.answer_tables import ENDS
+from tactileq.modeling.files.columns import Column, names, without
 
 # Two records of one presentation: the log's when a press was seen, and the rig's (s).
 SAME_START_S = 1e-3

@@ -11,10 +11,10 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from experiments.sessions.bids_tables import json_bytes, table_bytes
-from experiments.sessions.stored_sessions import StoredSession
-from modeling.files.answer_tables import ANSWER_TABLES, PARTICIPANT_COLUMNS, PARTICIPANT_ID
-from modeling.files.columns import Column, sidecar
+from tactileq.experiments.sessions.bids_tables import json_bytes, table_bytes
+from tactileq.experiments.sessions.stored_sessions import StoredSession
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES, PARTICIPANT_COLUMNS, PARTICIPANT_ID
+from tactileq.modeling.files.columns import Column, sidecar
 
 STATUS_LEVELS = {
     "complete": "all trials were answered",

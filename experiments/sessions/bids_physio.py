@@ -15,10 +15,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from experiments.sessions.log import Event
-from modeling.arrays import Floats
-from modeling.files.columns import Column
-from rig.interface import SURFACES
+from tactileq.experiments.sessions.log import Event
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.files.columns import Column
+from tactileq.rig.interface import SURFACES
 
 RATE_HZ = 250.0
 # Between readings further apart than this the hand's motion is unknown.

@@ -11,19 +11,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from experiments.sessions import bids_events
-from experiments.sessions.bids_tables import json_bytes, table_bytes
-from experiments.sessions.files import SessionFiles
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.stored_sessions import StoredSession
-from experiments.sessions.trace_rows import TraceRows, hand_rows, presentation_rows
-from experiments.sessions.traces import HAND_COLUMNS
-from modeling import InputError
-from modeling.files.answer_tables import ANSWER_TABLES, AnswerColumn
-from modeling.files.columns import names
-from modeling.files.columns import sidecar as sidecar_of
-from modeling.files.documents import read_json_object
-from modeling.files.hashes import sha256_of_paths
+from tactileq.experiments.sessions import bids_events
+from tactileq.experiments.sessions.bids_tables import json_bytes, table_bytes
+from tactileq.experiments.sessions.files import SessionFiles
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.stored_sessions import StoredSession
+from tactileq.experiments.sessions.trace_rows import TraceRows, hand_rows, presentation_rows
+from tactileq.experiments.sessions.traces import HAND_COLUMNS
+from tactileq.modeling import InputError
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES, AnswerColumn
+from tactileq.modeling.files.columns import names
+from tactileq.modeling.files.columns import sidecar as sidecar_of
+from tactileq.modeling.files.documents import read_json_object
+from tactileq.modeling.files.hashes import sha256_of_paths
 
 Made = dict[Path, bytes]
 
@@ -95,7 +95,7 @@ def _hand(held: StoredSession, runs: set[int]) -> tuple[Made, tuple[str, ...]]:
     found = hand_rows(path, runs=runs)
     if not found.rows:
         return {}, found.damaged
-    from experiments.sessions import bids_physio  # late: pandas takes longer to load than all else
+    from tactileq.experiments.sessions import bids_physio  # late: pandas takes longer to load than all else
 
     onsets = bids_events.onsets_s(held.state.events)
     made, damaged = {}, [*found.damaged]

@@ -11,8 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-from modeling.files.columns import Column, names
-from modeling.files.tables import guarded
+from tactileq.modeling.files.columns import Column, names
+from tactileq.modeling.files.tables import guarded
 
 MISSING = "n/a"
 # A table of BIDS has one line for a row, so neither a tab nor a line end can stand in a cell: they
@@ -25,7 +25,7 @@ def cell(value: object) -> str:
 
     Text that holds a quote is put in quotes and its quotes are doubled, as in CSV; readers of CSV
     get it back as it was. Control characters become their pictures. What a spreadsheet would
-    calculate has ' before it (`modeling.files.tables.guarded`).
+    calculate has ' before it (`tactileq.modeling.files.tables.guarded`).
     """
     if isinstance(value, str):
         return _text_cell(value)

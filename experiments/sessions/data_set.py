@@ -6,15 +6,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from experiments.sessions.files import write_new
-from experiments.sessions.log import plain
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.overrides import Overrides
-from experiments.study.study import Study
-from modeling import InputError
-from modeling.errors import shown
-from modeling.files.documents import dump_json, read_json_object
-from modeling.files.places import locked
+from tactileq.experiments.sessions.files import write_new
+from tactileq.experiments.sessions.log import plain
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.overrides import Overrides
+from tactileq.experiments.study.study import Study
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.documents import dump_json, read_json_object
+from tactileq.modeling.files.places import locked
 
 BIDS_VERSION = "1.10.0"
 DESCRIPTION_NAME = "dataset_description.json"

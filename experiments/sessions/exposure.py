@@ -8,10 +8,10 @@ from datetime import date, datetime
 from pathlib import Path
 from typing import Any
 
-from experiments.sessions.files import sessions_in
-from experiments.sessions.log import read_log
-from modeling import InputError
-from modeling.vibrators.exposure import daily_exposure_m_s2
+from tactileq.experiments.sessions.files import sessions_in
+from tactileq.experiments.sessions.log import read_log
+from tactileq.modeling import InputError
+from tactileq.modeling.vibrators.exposure import daily_exposure_m_s2
 
 EXPOSURE = "exposure"
 

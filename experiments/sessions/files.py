@@ -8,11 +8,11 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from modeling import InputError
-from modeling.errors import shortened
-from modeling.files.places import LOCK_NAME
-from modeling.files.reading import LONGEST_PATH
-from modeling.files.writing import write_bytes
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shortened
+from tactileq.modeling.files.places import LOCK_NAME
+from tactileq.modeling.files.reading import LONGEST_PATH
+from tactileq.modeling.files.writing import write_bytes
 
 _MANIFEST = re.compile(r"sub-(\d+)_ses-(\d+)_task-([A-Za-z]+)_manifest\.json")
 

@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from modeling import InputError
-from modeling.checks import is_number, is_whole
-from modeling.errors import shown
-from modeling.files.reading import read_bytes
+from tactileq.modeling import InputError
+from tactileq.modeling.checks import is_number, is_whole
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.reading import read_bytes
 
 Event = dict[str, Any]
 OWN_FIELDS = ("n", "utc", "t_s", "run", "event", "seal")

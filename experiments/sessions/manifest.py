@@ -11,12 +11,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
 
-from experiments.sessions.files import SessionFiles
-from experiments.sessions.log import plain
-from modeling.errors import InputError, shown
-from modeling.files.described import key
-from modeling.files.described_json import DescribedJson
-from modeling.files.hashes import sha256_of_values
+from tactileq.experiments.sessions.files import SessionFiles
+from tactileq.experiments.sessions.log import plain
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.files.described import key
+from tactileq.modeling.files.described_json import DescribedJson
+from tactileq.modeling.files.hashes import sha256_of_values
 
 _FromOne = Annotated[int, key(ge=1)]
 _Plain = Annotated[Mapping[str, Any], key(reads=plain)]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from experiments.sessions.task import Task
-from experiments.study.design import (
+from tactileq.experiments.sessions.task import Task
+from tactileq.experiments.study.design import (
     Occasion,
     Phase,
     SessionPlan,
@@ -14,8 +14,8 @@ from experiments.study.design import (
     fisher_yates,
     with_first_models,
 )
-from experiments.study.study import Study
-from modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.experiments.study.study import Study
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
 
 
 def draw_session(study: Study, task: Task, *, subject: int, session: int, slot: int) -> SessionPlan:

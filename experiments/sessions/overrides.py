@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from modeling import InputError
-from modeling.errors import shown
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
 
 
 class Overrides:

@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from experiments.sessions.surfaces import HIGHEST_RATING, Note, Surfaces, Whose
-from experiments.study.questions import Question
-from modeling import InputError
+from tactileq.experiments.sessions.surfaces import HIGHEST_RATING, Note, Surfaces, Whose
+from tactileq.experiments.study.questions import Question
+from tactileq.modeling import InputError
 
 
 class SessionAborted(Exception):

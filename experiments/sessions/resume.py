@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from experiments.sessions.log import Event, now_utc
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.state import SessionState
+from tactileq.experiments.sessions.log import Event, now_utc
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.state import SessionState
 
 Planned = Mapping[str, Any]
 

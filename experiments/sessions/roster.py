@@ -13,16 +13,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments.sessions.files import open_file, sessions_in, write_all
-from experiments.sessions.log import line_of, object_of, seal_after, utc_text
-from experiments.sessions.writer import StoreError, store_error
-from modeling import InputError
-from modeling.checks import check_whole
-from modeling.errors import shown
-from modeling.files.places import locked
-from modeling.files.reading import read_bytes
-from modeling.files.syncing import make_folder, sync_folder
-from modeling.files.writing import write_bytes
+from tactileq.experiments.sessions.files import open_file, sessions_in, write_all
+from tactileq.experiments.sessions.log import line_of, object_of, seal_after, utc_text
+from tactileq.experiments.sessions.writer import StoreError, store_error
+from tactileq.modeling import InputError
+from tactileq.modeling.checks import check_whole
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.places import locked
+from tactileq.modeling.files.reading import read_bytes
+from tactileq.modeling.files.syncing import make_folder, sync_folder
+from tactileq.modeling.files.writing import write_bytes
 
 # Easy to say and to hear apart in English and in Japanese: TAKI-46.
 _SYLLABLES = tuple(consonant + vowel for consonant in "KMNRST" for vowel in "AEIO")

@@ -9,27 +9,27 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from experiments.sessions.agenda import Agenda
-from experiments.sessions.exposure import exposed_g2_s
-from experiments.sessions.log import read_log
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.order import draw_session
-from experiments.sessions.overrides import Overrides
-from experiments.sessions.people import Intake
-from experiments.sessions.program import program_facts
-from experiments.sessions.resume import resumption
-from experiments.sessions.roster import LastSeal, Roster, RosterEntry
-from experiments.sessions.session_store import SessionStore
-from experiments.sessions.stored_sessions import held_session
-from experiments.sessions.task import Task
-from experiments.sessions.trial_loop import People, SessionResult, run_trials
-from experiments.sessions.writer import StoreError
-from experiments.study.design import SessionPlan
-from experiments.study.models import ModelSets
-from experiments.study.study import Study, plan_sha256
-from modeling import InputError
-from modeling.errors import shown
-from rig.interface import TextureRig
+from tactileq.experiments.sessions.agenda import Agenda
+from tactileq.experiments.sessions.exposure import exposed_g2_s
+from tactileq.experiments.sessions.log import read_log
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.order import draw_session
+from tactileq.experiments.sessions.overrides import Overrides
+from tactileq.experiments.sessions.people import Intake
+from tactileq.experiments.sessions.program import program_facts
+from tactileq.experiments.sessions.resume import resumption
+from tactileq.experiments.sessions.roster import LastSeal, Roster, RosterEntry
+from tactileq.experiments.sessions.session_store import SessionStore
+from tactileq.experiments.sessions.stored_sessions import held_session
+from tactileq.experiments.sessions.task import Task
+from tactileq.experiments.sessions.trial_loop import People, SessionResult, run_trials
+from tactileq.experiments.sessions.writer import StoreError
+from tactileq.experiments.study.design import SessionPlan
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.study import Study, plan_sha256
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.rig.interface import TextureRig
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,7 +101,7 @@ def run_session(
     SessionResult
         Not completed if somebody ended it early.
     Path
-        Its manifest, beside which its log lies; `experiments.sessions.bids` makes tables of them.
+        Its manifest, beside which its log lies; `tactileq.experiments.sessions.bids` makes tables of them.
 
     Raises
     ------

@@ -15,20 +15,20 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from experiments.sessions.admission import admit, refuse_begun
-from experiments.sessions.data_set import differing
-from experiments.sessions.files import (
+from tactileq.experiments.sessions.admission import admit, refuse_begun
+from tactileq.experiments.sessions.data_set import differing
+from tactileq.experiments.sessions.files import (
     SessionFiles,
     open_file,
     write_new,
 )
-from experiments.sessions.log import OWN_FIELDS, SESSION_ENDS, read_log, utc_text
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.overrides import Overrides
-from experiments.sessions.state import SessionState, state_of
-from experiments.sessions.stored_sessions import check_named
-from experiments.sessions.tables import GrowingTable
-from experiments.sessions.traces import (
+from tactileq.experiments.sessions.log import OWN_FIELDS, SESSION_ENDS, read_log, utc_text
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.overrides import Overrides
+from tactileq.experiments.sessions.state import SessionState, state_of
+from tactileq.experiments.sessions.stored_sessions import check_named
+from tactileq.experiments.sessions.tables import GrowingTable
+from tactileq.experiments.sessions.traces import (
     HAND_COLUMNS,
     PRESENTATION_COLUMNS,
     WALL_COLUMNS,
@@ -36,17 +36,17 @@ from experiments.sessions.traces import (
     pen_file,
     presentation_table,
 )
-from experiments.sessions.writer import LogWriter, StoreError, store_error
-from modeling import InputError
-from modeling.errors import shown
-from modeling.files.columns import Column, sidecar
-from modeling.files.documents import dump_json
-from modeling.files.hashes import sha256_of_paths
-from modeling.files.locks import HeldError, Lock
-from modeling.files.places import locked
-from modeling.files.syncing import make_folder, sync_folder
-from modeling.files.writing import write_bytes
-from rig.interface import Acceleration, Fault, HandRows, PresentationRecord
+from tactileq.experiments.sessions.writer import LogWriter, StoreError, store_error
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.columns import Column, sidecar
+from tactileq.modeling.files.documents import dump_json
+from tactileq.modeling.files.hashes import sha256_of_paths
+from tactileq.modeling.files.locks import HeldError, Lock
+from tactileq.modeling.files.places import locked
+from tactileq.modeling.files.syncing import make_folder, sync_folder
+from tactileq.modeling.files.writing import write_bytes
+from tactileq.rig.interface import Acceleration, Fault, HandRows, PresentationRecord
 
 CLAIM_S = 0.2  # who only asks whether a session is running holds its lock for a moment
 _NOTHING = "nothing was presented: free disk space or choose another data folder"

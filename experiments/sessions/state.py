@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from experiments.sessions.files import lock_of
-from experiments.sessions.log import Event, Log, read_log
-from modeling.files.locks import is_held
+from tactileq.experiments.sessions.files import lock_of
+from tactileq.experiments.sessions.log import Event, Log, read_log
+from tactileq.modeling.files.locks import is_held
 
 Status = Literal["running", "complete", "aborted", "crashed"]
 

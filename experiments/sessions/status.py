@@ -11,13 +11,13 @@ from datetime import date, datetime
 from pathlib import Path
 from typing import Any, Literal
 
-from experiments.sessions.files import require_data_folder
-from experiments.sessions.roster import Roster
-from experiments.sessions.state import Status
-from experiments.sessions.stored_sessions import Damaged, StoredSession, held_sessions
-from experiments.study.study import Study
-from modeling import InputError
-from modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.experiments.sessions.files import require_data_folder
+from tactileq.experiments.sessions.roster import Roster
+from tactileq.experiments.sessions.state import Status
+from tactileq.experiments.sessions.stored_sessions import Damaged, StoredSession, held_sessions
+from tactileq.experiments.study.study import Study
+from tactileq.modeling import InputError
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Protocol, Self
 
-from rig.interface import Acceleration, Fault, HandRows, PresentationRecord
+from tactileq.rig.interface import Acceleration, Fault, HandRows, PresentationRecord
 
 
 class Store(Protocol):

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments.sessions.files import SessionFiles, sessions_in
-from experiments.sessions.log import Event
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.state import SessionState, session_state
-from modeling import InputError
-from modeling.errors import shown
-from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.reading import read_bytes
+from tactileq.experiments.sessions.files import SessionFiles, sessions_in
+from tactileq.experiments.sessions.log import Event
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.state import SessionState, session_state
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.files.reading import read_bytes
 
 
 @dataclass(frozen=True, kw_only=True)

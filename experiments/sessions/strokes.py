@@ -8,8 +8,8 @@ from math import nan
 
 import numpy as np
 
-from modeling.arrays import Floats
-from rig.interface import SURFACES, HandRows, PresentationRecord
+from tactileq.modeling.arrays import Floats
+from tactileq.rig.interface import SURFACES, HandRows, PresentationRecord
 
 MOSTLY = 0.5
 OFTEN = 0.1

@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Literal, Protocol
 
-from modeling import InputError
-from rig.interface import Presentable, Stimulus, TextureRig, ToneBurst
+from tactileq.modeling import InputError
+from tactileq.rig.interface import Presentable, Stimulus, TextureRig, ToneBurst
 
 HIGHEST_RATING = 100.0
 Whose = Literal["participant", "experimenter", "signal", "program"]

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.sessions.files import open_file, write_all
-from experiments.sessions.writer import store_error
-from modeling import InputError
-from modeling.errors import shown
-from modeling.files.columns import Column, names
-from modeling.files.tables import guarded
+from tactileq.experiments.sessions.files import open_file, write_all
+from tactileq.experiments.sessions.writer import store_error
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.columns import Column, names
+from tactileq.modeling.files.tables import guarded
 
 MISSING = "n/a"
 

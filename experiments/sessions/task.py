@@ -6,14 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from experiments.sessions.people import Respondent
-from experiments.sessions.surfaces import Surfaces
-from experiments.study.design import Occasion, Order, Trial
-from experiments.study.models import ModelSets
-from modeling import InputError
-from modeling.errors import shown
-from modeling.files.answer_tables import ANSWER_TABLES, AnswerColumn
-from rig.interface import Presentable, TextureRig, ToneBurst
+from tactileq.experiments.sessions.people import Respondent
+from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.study.design import Occasion, Order, Trial
+from tactileq.experiments.study.models import ModelSets
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES, AnswerColumn
+from tactileq.rig.interface import Presentable, TextureRig, ToneBurst
 
 
 @dataclass(frozen=True, kw_only=True)

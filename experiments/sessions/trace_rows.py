@@ -7,12 +7,12 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from experiments.sessions.traces import HAND_COLUMNS, PRESENTATION_COLUMNS, WALL_COLUMNS
-from modeling import InputError
-from modeling.errors import counted
-from modeling.files.columns import Column, Columns, names
-from modeling.files.reading import read_bytes
-from modeling.files.tables import unguarded
+from tactileq.experiments.sessions.traces import HAND_COLUMNS, PRESENTATION_COLUMNS, WALL_COLUMNS
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import counted
+from tactileq.modeling.files.columns import Column, Columns, names
+from tactileq.modeling.files.reading import read_bytes
+from tactileq.modeling.files.tables import unguarded
 
 _WHOLE = r"\d{1,9}"
 # As `tables.cell` writes them: ten digits; no more than a floating-point number can have.

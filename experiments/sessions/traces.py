@@ -9,10 +9,10 @@ from math import inf
 
 import numpy as np
 
-from experiments.sessions.strokes import Outside, outside_grid
-from modeling import InputError
-from modeling.files.columns import Column
-from rig.interface import SURFACES, Acceleration, Fault, HandRows, PresentationRecord
+from tactileq.experiments.sessions.strokes import Outside, outside_grid
+from tactileq.modeling import InputError
+from tactileq.modeling.files.columns import Column
+from tactileq.rig.interface import SURFACES, Acceleration, Fault, HandRows, PresentationRecord
 
 _CLOCK = "seconds since the rig was opened"
 _NUMBER = (-inf, inf)

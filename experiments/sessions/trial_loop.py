@@ -13,22 +13,22 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from statistics import median
 
-from experiments.sessions.agenda import Agenda
-from experiments.sessions.exposure import EXPOSURE, Exposure
-from experiments.sessions.people import (
+from tactileq.experiments.sessions.agenda import Agenda
+from tactileq.experiments.sessions.exposure import EXPOSURE, Exposure
+from tactileq.experiments.sessions.people import (
     Experimenter,
     Intake,
     ProgressReport,
     Respondent,
     SessionAborted,
 )
-from experiments.sessions.store import Store
-from experiments.sessions.strokes import OFTEN, advice_on, beyond_edge, outside_grid
-from experiments.sessions.surfaces import Surfaces
-from experiments.sessions.task import Task
-from experiments.study.design import SessionPlan, Trial
-from experiments.study.models import ModelSets
-from rig.interface import Fault, HandRows, PresentationRecord, TextureRig
+from tactileq.experiments.sessions.store import Store
+from tactileq.experiments.sessions.strokes import OFTEN, advice_on, beyond_edge, outside_grid
+from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.sessions.task import Task
+from tactileq.experiments.study.design import SessionPlan, Trial
+from tactileq.experiments.study.models import ModelSets
+from tactileq.rig.interface import Fault, HandRows, PresentationRecord, TextureRig
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +86,7 @@ def run_trials(
     pilot : bool
         Whether the answers do not count.
     exposed_g2_s : float
-        Weighted vibration that the participant had that day (`experiments.sessions.exposure`).
+        Weighted vibration that the participant had that day (`tactileq.experiments.sessions.exposure`).
 
     Returns
     -------

@@ -8,13 +8,13 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from experiments.sessions.bids import Exported, export_all
-from experiments.sessions.files import require_data_folder, sessions_in
-from experiments.sessions.roster import Roster
-from experiments.sessions.state import is_running
-from modeling import InputError
-from modeling.files.places import clear_unfinished
-from modeling.files.writing import write_bytes
+from tactileq.experiments.sessions.bids import Exported, export_all
+from tactileq.experiments.sessions.files import require_data_folder, sessions_in
+from tactileq.experiments.sessions.roster import Roster
+from tactileq.experiments.sessions.state import is_running
+from tactileq.modeling import InputError
+from tactileq.modeling.files.places import clear_unfinished
+from tactileq.modeling.files.writing import write_bytes
 
 
 def withdraw(data_folder: str | Path, subject: int) -> Exported:

@@ -11,8 +11,8 @@ from threading import Event as Signal
 from threading import Thread
 from typing import Any
 
-from experiments.sessions.log import line_of, sealed_line
-from modeling.files.reading import reason_of
+from tactileq.experiments.sessions.log import line_of, sealed_line
+from tactileq.modeling.files.reading import reason_of
 
 
 class StoreError(OSError):

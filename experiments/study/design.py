@@ -21,9 +21,9 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 
-from experiments.study.study import TASKS, Study
-from modeling.checks import check_whole
-from modeling.seeds import generator, number_of
+from tactileq.experiments.study.study import TASKS, Study
+from tactileq.modeling.checks import check_whole
+from tactileq.modeling.seeds import generator, number_of
 
 Phase = Literal["training", "main"]
 Item = TypeVar("Item")

@@ -8,17 +8,17 @@ from itertools import combinations
 from pathlib import Path
 from typing import NoReturn
 
-from experiments.study.study import Study
-from modeling import InputError, TextureModel
-from modeling.checks import check_keys
-from modeling.files.stimulus_table import MANIFEST as STIMULI
-from modeling.models.compiled_for import CompiledFor
-from modeling.models.loading import load_any_models
-from modeling.models.loading import made_from as model_made_from
-from modeling.scenes.compiled import FILE as SCENE
-from modeling.scenes.loading import scene_files, scene_models
-from rig.interface import Presentable, Stimulus
-from rig.sound.signals import stimuli_of_surfaces
+from tactileq.experiments.study.study import Study
+from tactileq.modeling import InputError, TextureModel
+from tactileq.modeling.checks import check_keys
+from tactileq.modeling.files.stimulus_table import MANIFEST as STIMULI
+from tactileq.modeling.models.compiled_for import CompiledFor
+from tactileq.modeling.models.loading import load_any_models
+from tactileq.modeling.models.loading import made_from as model_made_from
+from tactileq.modeling.scenes.compiled import FILE as SCENE
+from tactileq.modeling.scenes.loading import scene_files, scene_models
+from tactileq.rig.interface import Presentable, Stimulus
+from tactileq.rig.sound.signals import stimuli_of_surfaces
 
 # What may continue where a reason is given: a word for what, and the sentence that refuses it.
 Allow = Callable[[str, str], None]
@@ -206,7 +206,7 @@ def load_model_sets(
     ------
     InputError
         For a set that the study does not name, for a place without models, and for what
-        `modeling.scenes.loading.scene_models` refuses.
+        `tactileq.modeling.scenes.loading.scene_models` refuses.
     """
     given = dict(overriding or {})
     check_keys(given, tuple(study.models), where="the sets of models of the study")

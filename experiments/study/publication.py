@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
-from modeling.files.described import FileSection, key
-from modeling.files.kinds import Label, ListedLabel, is_label
+from tactileq.modeling.files.described import FileSection, key
+from tactileq.modeling.files.kinds import Label, ListedLabel, is_label
 
 _ORCID = r"^(\d{4}-){3}\d{3}[\dX]$"
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from math import ceil, floor
 from typing import Annotated, Any, ClassVar
 
-from modeling import InputError
-from modeling.errors import shown
-from modeling.files.described import FileSection, key
-from modeling.files.kinds import Label, is_different, is_line
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.described import FileSection, key
+from tactileq.modeling.files.kinds import Label, is_different, is_line
 
 # Those whose wording the language files of the console hold.
 SHIPPED = ("age", "sex", "handedness")

@@ -10,24 +10,24 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
-from experiments.study.publication import PublicationSection
-from experiments.study.questions import Question
-from experiments.study.task_plan import (
+from tactileq.experiments.study.publication import PublicationSection
+from tactileq.experiments.study.questions import Question
+from tactileq.experiments.study.task_plan import (
     PAPER_PLANS,
     REPEATS,
     TaskPlan,
     check_plan,
     with_catch_trials,
 )
-from experiments.study.wall import WallSection
-from modeling import InputError
-from modeling.checks import check_keys
-from modeling.errors import shown
-from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.claims import ClaimSection, PlanSection
-from modeling.files.described import DescribedFile, FileSection, key
-from modeling.files.hashes import sha256_of_values
-from modeling.files.kinds import Label, ListedLabel, is_different, is_label, is_line
+from tactileq.experiments.study.wall import WallSection
+from tactileq.modeling import InputError
+from tactileq.modeling.checks import check_keys
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.files.claims import ClaimSection, PlanSection
+from tactileq.modeling.files.described import DescribedFile, FileSection, key
+from tactileq.modeling.files.hashes import sha256_of_values
+from tactileq.modeling.files.kinds import Label, ListedLabel, is_different, is_label, is_line
 
 # Their order is part of every seed: new ones go to the end.
 TASKS = tuple(dict.fromkeys(("absolute", "relative", "oddity", "threshold", *ANSWER_TABLES)))

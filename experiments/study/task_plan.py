@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar, Literal
 
-from modeling import InputError
-from modeling.errors import shown
-from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.described import FileSection, key
-from modeling.files.kinds import Label, is_different
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.files.described import FileSection, key
+from tactileq.modeling.files.kinds import Label, is_different
 
 # The usual repeats of a task whose table does not say; 1 in any other.
 REPEATS = {"relative": 3, "oddity": 6, "threshold": 60}

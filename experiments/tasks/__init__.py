@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from experiments.sessions.order import draw_session
-from experiments.sessions.task import Task
-from experiments.study.design import SessionPlan
-from experiments.study.study import Study
-from modeling import InputError
-from modeling.errors import shown
-from modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.experiments.sessions.order import draw_session
+from tactileq.experiments.sessions.task import Task
+from tactileq.experiments.study.design import SessionPlan
+from tactileq.experiments.study.study import Study
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
 
 
 def task_named(name: str) -> Task:
@@ -19,7 +19,7 @@ def task_named(name: str) -> Task:
         raise InputError(
             f"expected the task {' or '.join(ANSWER_TABLES)}, got {shown(name)}; choose one."
         )
-    found: Task = import_module(f"experiments.tasks.{name}").TASK
+    found: Task = import_module(f"tactileq.experiments.tasks.{name}").TASK
     return found
 
 

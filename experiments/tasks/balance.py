@@ -6,10 +6,10 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from experiments.study.design import Trial
-from experiments.study.study import Study
-from experiments.tasks import plan_session
-from modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.experiments.study.design import Trial
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.tasks import plan_session
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
 
 
 @dataclass(frozen=True, kw_only=True)

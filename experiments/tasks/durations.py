@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from experiments.study.study import Study
-from experiments.tasks import plan_session
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.tasks import plan_session
 
 # Seconds of one trial, with the mounting of its sample where there is one: assumed, not measured.
 TRIAL_S = {"absolute": 50.0, "relative": 75.0, "oddity": 60.0, "threshold": 5.0}

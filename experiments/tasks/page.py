@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
-from experiments.study.models import ModelSets
-from experiments.study.study import Study, plan_sha256
-from experiments.study.task_plan import TaskPlan
-from experiments.tasks import task_named
-from experiments.tasks.durations import (
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.study import Study, plan_sha256
+from tactileq.experiments.study.task_plan import TaskPlan
+from tactileq.experiments.tasks import task_named
+from tactileq.experiments.tasks.durations import (
     minutes_of_catch_trials,
     minutes_of_session,
     trials_of_session,
 )
-from modeling.errors import counted
-from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.claims import RATINGS, ClaimSection, PlanSection
+from tactileq.modeling.errors import counted
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.files.claims import RATINGS, ClaimSection, PlanSection
 
 TESTED = {
     "equivalence": "two one-sided t-tests of the differences within persons (TOST)",

@@ -11,12 +11,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from experiments.sessions.people import Respondent
-from experiments.sessions.surfaces import Surfaces
-from experiments.sessions.task import Task
-from experiments.study.design import Occasion, Order, Trial, fisher_yates
-from experiments.study.models import ModelSets
-from rig.interface import Presentable
+from tactileq.experiments.sessions.people import Respondent
+from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.sessions.task import Task
+from tactileq.experiments.study.design import Occasion, Order, Trial, fisher_yates
+from tactileq.experiments.study.models import ModelSets
+from tactileq.rig.interface import Presentable
 
 # --- Parameters -----------------------------------------------------------------------------
 

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from modeling import InputError
-from modeling.arrays import Floats
-from modeling.errors import shown
+from tactileq.modeling import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import shown
 
 if TYPE_CHECKING:
     from questplus import QuestPlus

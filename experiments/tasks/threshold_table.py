@@ -12,14 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.tasks.threshold import DURATION_S
-from experiments.tasks.threshold_posterior import Estimate, answers_of, estimate
-from modeling import InputError
-from modeling.errors import counted
-from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.columns import Column, chosen
-from modeling.files.tables import Row, read_table, table_text
-from modeling.perception.thresholds import THRESHOLD_COLUMNS
+from tactileq.experiments.tasks.threshold import DURATION_S
+from tactileq.experiments.tasks.threshold_posterior import Estimate, answers_of, estimate
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import counted
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.files.columns import Column, chosen
+from tactileq.modeling.files.tables import Row, read_table, table_text
+from tactileq.modeling.perception.thresholds import THRESHOLD_COLUMNS
 
 READ = chosen(
     ANSWER_TABLES["threshold"].columns,

@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from experiments.verification.difference import Difference
-from modeling import InputError
-from modeling.files.documents import read_json_object
-from modeling.files.hashes import sha256_of_file
+from tactileq.experiments.verification.difference import Difference
+from tactileq.modeling import InputError
+from tactileq.modeling.files.documents import read_json_object
+from tactileq.modeling.files.hashes import sha256_of_file
 
 
 def check_sidecars(root: Path) -> tuple[tuple[Difference, ...], tuple[str, ...]]:

@@ -11,24 +11,24 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from experiments.sessions.bids import differing_tables
-from experiments.sessions.data_set import DESCRIPTION_NAME, MAY_DIFFER, describe_data_set
-from experiments.sessions.files import SessionFiles, require_data_folder, sessions_in
-from experiments.sessions.log import plain
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.order import draw_session
-from experiments.sessions.roster import Roster
-from experiments.sessions.stored_sessions import Damaged, StoredSession, held_sessions
-from experiments.study.study import Study, plan_sha256
-from experiments.tasks import task_named
-from experiments.verification.copies import copied
-from experiments.verification.difference import Difference
-from experiments.verification.replaying import contradictions
-from experiments.verification.sidecars import check_sidecars
-from modeling import InputError
-from modeling.errors import counted, shown
-from modeling.files.documents import read_json_object
-from modeling.files.hashes import seal_over, sha256_of_paths
+from tactileq.experiments.sessions.bids import differing_tables
+from tactileq.experiments.sessions.data_set import DESCRIPTION_NAME, MAY_DIFFER, describe_data_set
+from tactileq.experiments.sessions.files import SessionFiles, require_data_folder, sessions_in
+from tactileq.experiments.sessions.log import plain
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.order import draw_session
+from tactileq.experiments.sessions.roster import Roster
+from tactileq.experiments.sessions.stored_sessions import Damaged, StoredSession, held_sessions
+from tactileq.experiments.study.study import Study, plan_sha256
+from tactileq.experiments.tasks import task_named
+from tactileq.experiments.verification.copies import copied
+from tactileq.experiments.verification.difference import Difference
+from tactileq.experiments.verification.replaying import contradictions
+from tactileq.experiments.verification.sidecars import check_sidecars
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import counted, shown
+from tactileq.modeling.files.documents import read_json_object
+from tactileq.modeling.files.hashes import seal_over, sha256_of_paths
 
 _OF_A_SESSION = re.compile(r"(sub-\d+)_ses-\d+_task-.*")
 # Of the description: what the first session fixes. The rest is for people to fill in.

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
 
 LOWEST_FREQUENCY_HZ = 1.0
 HIGHEST_FREQUENCY_SHARE = 0.49

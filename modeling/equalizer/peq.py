@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from modeling.arrays import Floats
-from modeling.checks import check_rate
-from modeling.equalizer.bands import band_response, band_rms, check_bands
-from modeling.errors import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import check_rate
+from tactileq.modeling.equalizer.bands import band_response, band_rms, check_bands
+from tactileq.modeling.errors import InputError
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from modeling.arrays import Floats
+from tactileq.modeling.arrays import Floats
 
 
 def sign_patterns(frequencies_hz: Floats) -> Floats:

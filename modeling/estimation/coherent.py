@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats, Integers
-from modeling.equalizer.bands import HIGHEST_FREQUENCY_SHARE, LOWEST_BANDWIDTH_HZ
-from modeling.estimation.compiled import CompiledSpectra, Costs, is_compiled
-from modeling.estimation.likelihood import (
+from tactileq.modeling.arrays import Bools, Floats, Integers
+from tactileq.modeling.equalizer.bands import HIGHEST_FREQUENCY_SHARE, LOWEST_BANDWIDTH_HZ
+from tactileq.modeling.estimation.compiled import CompiledSpectra, Costs, is_compiled
+from tactileq.modeling.estimation.likelihood import (
     LEAST_POWER,
     WIDEST_LOG_GAIN,
     WIDEST_SHARE,

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Floats, Integers
-from modeling.engines import prefers_python
+from tactileq.modeling.arrays import Floats, Integers
+from tactileq.modeling.engines import prefers_python
 
 try:
-    from modeling.estimation._slopes import ffi, lib
+    from tactileq.modeling.estimation._slopes import ffi, lib
 except ImportError:  # no compiler at installation
     ffi = lib = None
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from modeling.estimation.joint import fit_jointly
-from modeling.estimation.layers import Layers, check_estimator
-from modeling.estimation.paper import find_peak_frequencies, fit_layers
-from modeling.recordings.spectrum import Spectrum
+from tactileq.modeling.estimation.joint import fit_jointly
+from tactileq.modeling.estimation.layers import Layers, check_estimator
+from tactileq.modeling.estimation.paper import find_peak_frequencies, fit_layers
+from tactileq.modeling.recordings.spectrum import Spectrum
 
 
 def find_layers(spectrum: Spectrum, *, estimator: str = "joint") -> Layers:

@@ -9,14 +9,14 @@ from itertools import product
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.equalizer.bands import clamp_bands
-from modeling.equalizer.peq import PEQ
-from modeling.equalizer.signs import sign_patterns
-from modeling.errors import InputError, counted
-from modeling.estimation.coherent import Climbed, climb, limits_of, observe
-from modeling.estimation.likelihood import Power, centres_and_widths, signal_power, split
-from modeling.recordings.spectrum import Spectrum
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.bands import clamp_bands
+from tactileq.modeling.equalizer.peq import PEQ
+from tactileq.modeling.equalizer.signs import sign_patterns
+from tactileq.modeling.errors import InputError, counted
+from tactileq.modeling.estimation.coherent import Climbed, climb, limits_of, observe
+from tactileq.modeling.estimation.likelihood import Power, centres_and_widths, signal_power, split
+from tactileq.modeling.recordings.spectrum import Spectrum
 
 _WIDTH_SHARES = (0.5, 1.0)
 _NOISE_DB = (0.0, -20.0)

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from modeling.arrays import Bools
-from modeling.equalizer.signs import sign_patterns
-from modeling.estimation.coherent import (
+from tactileq.modeling.arrays import Bools
+from tactileq.modeling.equalizer.signs import sign_patterns
+from tactileq.modeling.estimation.coherent import (
     LINE_WIDTH,
     Climbed,
     Observed,
@@ -24,10 +24,10 @@ from modeling.estimation.coherent import (
     response,
     without_layer,
 )
-from modeling.estimation.layers import Layers, no_layers
-from modeling.estimation.likelihood import NEPER_DB, Power, bins_near, signal_power, split
-from modeling.estimation.peaks import Peaks, find_peaks_jointly, penalty, power_sum_misfit
-from modeling.recordings.spectrum import Spectrum
+from tactileq.modeling.estimation.layers import Layers, no_layers
+from tactileq.modeling.estimation.likelihood import NEPER_DB, Power, bins_near, signal_power, split
+from tactileq.modeling.estimation.peaks import Peaks, find_peaks_jointly, penalty, power_sum_misfit
+from tactileq.modeling.recordings.spectrum import Spectrum
 
 # The coherent response holds where it fits as well as the power sum does, in log likelihood.
 COHERENT_BY = 5.0

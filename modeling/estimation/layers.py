@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats
-from modeling.equalizer.peq import PEQ
-from modeling.errors import InputError, shown
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.equalizer.peq import PEQ
+from tactileq.modeling.errors import InputError, shown
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,10 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats
-from modeling.equalizer.bands import HIGHEST_FREQUENCY_SHARE, LOWEST_BANDWIDTH_HZ
-from modeling.estimation.compiled import CompiledLines, is_compiled
-from modeling.recordings.spectrum import HIGH_PASS_HZ, Spectrum
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.equalizer.bands import HIGHEST_FREQUENCY_SHARE, LOWEST_BANDWIDTH_HZ
+from tactileq.modeling.estimation.compiled import CompiledLines, is_compiled
+from tactileq.modeling.recordings.spectrum import HIGH_PASS_HZ, Spectrum
 
 # Half an octave above its corner the preparation's high-pass takes less than 0.2 dB.
 LOWEST_FITTED_HZ = 1.5 * HIGH_PASS_HZ

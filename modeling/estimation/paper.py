@@ -10,16 +10,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats
-from modeling.equalizer.bands import (
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.equalizer.bands import (
     HIGHEST_BANDWIDTH_SHARE,
     LOWEST_BANDWIDTH_HZ,
     LOWEST_FREQUENCY_HZ,
     band_response,
 )
-from modeling.estimation.layers import EstimatorName, Layers
-from modeling.estimation.paper_deviations import smoothed_level_sd_db
-from modeling.recordings.spectrum import SMOOTHING_HZ, Spectrum, smooth
+from tactileq.modeling.estimation.layers import EstimatorName, Layers
+from tactileq.modeling.estimation.paper_deviations import smoothed_level_sd_db
+from tactileq.modeling.recordings.spectrum import SMOOTHING_HZ, Spectrum, smooth
 
 NOISE_BAND = (0.8, 1.0)  # of the Nyquist frequency (2.0–2.5 kHz at 5 kHz)
 # A hill counts as a peak where it rises above its saddle by more than the smoothed spectrum's own

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.recordings.spectrum import SMOOTHING_HZ, Spectrum, smooth
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.recordings.spectrum import SMOOTHING_HZ, Spectrum, smooth
 
 DB_PER_NEPER = float(20 / np.log(10))
 # A layer without height above the floor would have an infinite deviation, which no file can hold.

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.estimation.likelihood import (
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.estimation.likelihood import (
     FORGIVEN_MISFIT,
     Bins,
     Power,

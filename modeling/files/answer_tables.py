@@ -1,7 +1,7 @@
 """The tables of answers and of participants: experiments write them, analysis reads them.
 
 A task exists once its table stands in `ANSWER_TABLES`; what is presented and asked in it is in
-`experiments.tasks`, in a module of the task's name. What the report says of it follows from the
+`tactileq.experiments.tasks`, in a module of the task's name. What the report says of it follows from the
 table (docs/own-protocol.md).
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf, isnan, nan
 
-from modeling.files.columns import Column
+from tactileq.modeling.files.columns import Column
 
 ENDS = (0.0, 100.0)  # of every scale that people rate on
 

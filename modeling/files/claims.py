@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from modeling.errors import InputError, shown
-from modeling.files.answer_tables import ANSWER_TABLES, ENDS
-from modeling.files.described import FileSection, key
-from modeling.files.hashes import sha256_of_values
-from modeling.files.kinds import Label, is_different
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES, ENDS
+from tactileq.modeling.files.described import FileSection, key
+from tactileq.modeling.files.hashes import sha256_of_values
+from tactileq.modeling.files.kinds import Label, is_different
 
 FEW = 0.15
 LARGEST_FEW = 0.5

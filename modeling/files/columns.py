@@ -12,8 +12,8 @@ from dataclasses import KW_ONLY, dataclass, field, replace
 from math import inf, isinf, isnan
 from typing import Any
 
-from modeling.checks import is_number, is_whole
-from modeling.errors import InputError, shown
+from tactileq.modeling.checks import is_number, is_whole
+from tactileq.modeling.errors import InputError, shown
 
 MISSING = ("", "n/a")
 ABOVE_0 = 5e-324  # the lower limit of what has to be above 0

@@ -1,4 +1,4 @@
-"""JSON files that programs write, declared once: the sections of `modeling.files.described`.
+"""JSON files that programs write, declared once: the sections of `tactileq.modeling.files.described`.
 
 docs/where.md#a-key-of-a-file
 """
@@ -10,11 +10,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
-from modeling.errors import InputError, shown
-from modeling.files.described import FileSection, naming, no_table
-from modeling.files.documents import dump_json, read_json_object
-from modeling.files.hashes import sha256_of
-from modeling.files.writing import write_text
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.files.described import FileSection, naming, no_table
+from tactileq.modeling.files.documents import dump_json, read_json_object
+from tactileq.modeling.files.hashes import sha256_of
+from tactileq.modeling.files.writing import write_text
 
 
 class DescribedJson(FileSection):

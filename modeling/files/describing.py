@@ -7,8 +7,8 @@ from typing import Any
 
 import msgspec
 
-from modeling.files.described import NOT_FINITE, DescribedFile, FileSection, Key, keys_of, plain
-from modeling.files.described_json import DescribedJson
+from tactileq.modeling.files.described import NOT_FINITE, DescribedFile, FileSection, Key, keys_of, plain
+from tactileq.modeling.files.described_json import DescribedJson
 
 BAR = r"\|"  # in a cell of Markdown
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from sys import float_info
 from typing import Any
 
-from modeling.errors import InputError, shortened, shown
-from modeling.files.reading import read_text
+from tactileq.modeling.errors import InputError, shortened, shown
+from tactileq.modeling.files.reading import read_text
 
 _TOO_DEEP = "values nested too deeply"
 _TOO_LARGE = "a whole number too large for any calculation"

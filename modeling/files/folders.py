@@ -10,18 +10,18 @@ from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from modeling.errors import InputError, shown
-from modeling.files.columns import Column
-from modeling.files.places import (
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.files.columns import Column
+from tactileq.modeling.files.places import (
     behind_links,
     clear_unfinished,
     is_hidden,
     locked,
     unfinished_folder,
 )
-from modeling.files.reading import check_file
-from modeling.files.syncing import sync_folder, sync_tree
-from modeling.files.tables import read_cells
+from tactileq.modeling.files.reading import check_file
+from tactileq.modeling.files.syncing import sync_folder, sync_tree
+from tactileq.modeling.files.tables import read_cells
 
 Contents = Mapping[str, tuple[int, ...]]
 

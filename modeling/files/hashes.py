@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from modeling.files.places import is_hidden
+from tactileq.modeling.files.places import is_hidden
 
 
 def sha256_of(text: str) -> str:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated
 
-from modeling.checks import HIGHEST_RATE_HZ, LONGEST_NAME, LOWEST_RATE_HZ, UNITS
-from modeling.files.described import key
+from tactileq.modeling.checks import HIGHEST_RATE_HZ, LONGEST_NAME, LOWEST_RATE_HZ, UNITS
+from tactileq.modeling.files.described import key
 
 
 def is_line(text: str) -> bool:

@@ -15,8 +15,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from modeling.errors import InputError
-from modeling.files.reading import reason_of
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.files.reading import reason_of
 
 if TYPE_CHECKING:
     from filelock import BaseFileLock

@@ -16,9 +16,9 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from modeling.errors import InputError
-from modeling.files.locks import WAIT_S, HeldError, Lock
-from modeling.files.syncing import make_folder
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.files.locks import WAIT_S, HeldError, Lock
+from tactileq.modeling.files.syncing import make_folder
 
 ENDING = ".unfinished"
 LOCK_NAME = ".tactileq.lock"  # of a folder; that of a file beside it has this ending

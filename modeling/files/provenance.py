@@ -9,8 +9,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from modeling.files.hashes import sha256_of_file
-from modeling.files.writing import write_text
+from tactileq.modeling.files.hashes import sha256_of_file
+from tactileq.modeling.files.writing import write_text
 
 PROVENANCE_NAME = "provenance.json"
 NOT_INSTALLED = "not installed"

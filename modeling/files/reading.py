@@ -6,7 +6,7 @@ import errno
 import stat
 from pathlib import Path
 
-from modeling.errors import InputError, shortened
+from tactileq.modeling.errors import InputError, shortened
 
 LONGEST_PATH = 200
 _REASONS = {

@@ -6,9 +6,9 @@ from dataclasses import MISSING
 
 import numpy as np
 
-from modeling.errors import InputError
-from modeling.files.described import keys_of
-from modeling.files.described_json import DescribedJson
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.files.described import keys_of
+from tactileq.modeling.files.described_json import DescribedJson
 
 
 class SavedModel(DescribedJson):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import inf
 
-from modeling.files.columns import ABOVE_0, Column
+from tactileq.modeling.files.columns import ABOVE_0, Column
 
 MANIFEST = "manifest.tsv"
 STIMULUS_COLUMNS = (

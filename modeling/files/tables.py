@@ -8,10 +8,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
-from modeling.errors import InputError, shortened, shown
-from modeling.files.columns import Column, Value, names
-from modeling.files.reading import read_text
-from modeling.files.writing import write_text
+from tactileq.modeling.errors import InputError, shortened, shown
+from tactileq.modeling.files.columns import Column, Value, names
+from tactileq.modeling.files.reading import read_text
+from tactileq.modeling.files.writing import write_text
 
 # A spreadsheet would calculate what begins so, whatever it names.
 _FORMULA = re.compile(r"'*[=+@]")

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from modeling.files.reading import check_file
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.files.reading import check_file
 
 # The first bytes of sound files. In others libsndfile would look for MP3 and report it on stderr.
 _FORMS = (b"RIFF", b"RIFX", b"RF64", b"riff", b"FORM", b"fLaC")

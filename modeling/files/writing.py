@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from modeling.files.places import behind_links, locked, unfinished_file
-from modeling.files.syncing import sync_folder
+from tactileq.modeling.files.places import behind_links, locked, unfinished_file
+from tactileq.modeling.files.syncing import sync_folder
 
 
 def file_stem(name: str) -> str:

@@ -6,16 +6,16 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.checks import is_whole
-from modeling.errors import InputError
-from modeling.fitting.conditions import only_unit, recording_spectra, spectra_by_condition
-from modeling.models.ar_model import ARFilter, ARModel
-from modeling.models.grid import fill_grid, grid_axes
-from modeling.models.line_spectral import line_spectral_frequencies
-from modeling.recordings.recording import Recording
-from modeling.recordings.recording_set import RecordingSet
-from modeling.recordings.spectrum import Spectrum
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import is_whole
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.fitting.conditions import only_unit, recording_spectra, spectra_by_condition
+from tactileq.modeling.models.ar_model import ARFilter, ARModel
+from tactileq.modeling.models.grid import fill_grid, grid_axes
+from tactileq.modeling.models.line_spectral import line_spectral_frequencies
+from tactileq.modeling.recordings.recording import Recording
+from tactileq.modeling.recordings.recording_set import RecordingSet
+from tactileq.modeling.recordings.spectrum import Spectrum
 
 HIGHEST_ORDER = 40
 # White noise 90 dB below the record keeps an order that the data do not need from being singular.

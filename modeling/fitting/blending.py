@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats, Integers
-from modeling.estimation.coherent import Observed, Response, response
-from modeling.estimation.compiled import held_by_cells, is_compiled
-from modeling.estimation.likelihood import NEPER_DB, split
-from modeling.fitting.equations import STEP_OF_CORNERS, Blocks, of_cells
+from tactileq.modeling.arrays import Bools, Floats, Integers
+from tactileq.modeling.estimation.coherent import Observed, Response, response
+from tactileq.modeling.estimation.compiled import held_by_cells, is_compiled
+from tactileq.modeling.estimation.likelihood import NEPER_DB, split
+from tactileq.modeling.fitting.equations import STEP_OF_CORNERS, Blocks, of_cells
 
 REACH = 6.0  # of a moving peak to either side, in widths
 # In nepers: a peak that meets another one at two of four corners is twice as high there.

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from modeling.models.grid import Condition
-from modeling.recordings.recording import Recording
-from modeling.recordings.recording_set import RecordingSet
-from modeling.recordings.sinusoids import common_hum, without_hum
-from modeling.recordings.spectrum import (
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.models.grid import Condition
+from tactileq.modeling.recordings.recording import Recording
+from tactileq.modeling.recordings.recording_set import RecordingSet
+from tactileq.modeling.recordings.sinusoids import common_hum, without_hum
+from tactileq.modeling.recordings.spectrum import (
     MODEL_RATE_HZ,
     Spectrum,
     mean_spectrum,
@@ -18,7 +18,7 @@ from modeling.recordings.spectrum import (
     prepared_spectrum,
     subtract_floor,
 )
-from modeling.recordings.stationarity import Drift, drift_of, without_drift
+from tactileq.modeling.recordings.stationarity import Drift, drift_of, without_drift
 
 
 def spectra_by_condition(

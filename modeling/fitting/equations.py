@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats, Integers
+from tactileq.modeling.arrays import Bools, Floats, Integers
 
 # (rows, columns) from a node to the one that a block couples it with; the corners of a cell are
 # numbered row by row.

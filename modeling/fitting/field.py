@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Floats, Integers
-from modeling.estimation.coherent import (
+from tactileq.modeling.arrays import Floats, Integers
+from tactileq.modeling.estimation.coherent import (
     FIRST_DAMPING,
     HOPELESS_DAMPING,
     LEAST_DAMPING,
@@ -28,8 +28,8 @@ from modeling.estimation.coherent import (
     Slopes,
     slopes,
 )
-from modeling.fitting.blending import Middles
-from modeling.fitting.equations import Blocks, Corners, band_of, rows_of, solve_blocks
+from tactileq.modeling.fitting.blending import Middles
+from tactileq.modeling.fitting.equations import Blocks, Corners, band_of, rows_of, solve_blocks
 
 # What differences between neighbours are expected to be, beside their trend, before anything is
 # known: a sixth in each parameter, and 3 dB more in the level of all gains together. It counts as

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Floats, Integers
-from modeling.equalizer.bands import HIGHEST_FREQUENCY_SHARE
-from modeling.estimation.coherent import Observed, response
-from modeling.estimation.likelihood import FORGIVEN_MISFIT, LOWEST_FITTED_HZ, Power, split
-from modeling.fitting.texture_grid import TextureGrid
+from tactileq.modeling.arrays import Floats, Integers
+from tactileq.modeling.equalizer.bands import HIGHEST_FREQUENCY_SHARE
+from tactileq.modeling.estimation.coherent import Observed, response
+from tactileq.modeling.estimation.likelihood import FORGIVEN_MISFIT, LOWEST_FITTED_HZ, Power, split
+from tactileq.modeling.fitting.texture_grid import TextureGrid
 
 # What doubling does: see `layer_search`.
 CELL = 0.02  # of log frequency; doubled: +4 %, worst +45 %, three layers fewer

@@ -14,25 +14,25 @@ from itertools import combinations
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats
-from modeling.errors import counted
-from modeling.estimation.coherent import (
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.errors import counted
+from tactileq.modeling.estimation.coherent import (
     level_deviations,
     misfits,
     record_information,
     response,
     without_layer,
 )
-from modeling.estimation.layers import Layers
-from modeling.estimation.likelihood import NEPER_DB, split
-from modeling.fitting.blending import distances_db
-from modeling.fitting.equations import Blocks
-from modeling.fitting.field import (
+from tactileq.modeling.estimation.layers import Layers
+from tactileq.modeling.estimation.likelihood import NEPER_DB, split
+from tactileq.modeling.fitting.blending import distances_db
+from tactileq.modeling.fitting.equations import Blocks
+from tactileq.modeling.fitting.field import (
     Covariances,
     covariances,
     solve,
 )
-from modeling.fitting.layer_search import (
+from tactileq.modeling.fitting.layer_search import (
     MOST_LAYERS,
     Solution,
     completed,
@@ -42,11 +42,11 @@ from modeling.fitting.layer_search import (
     search,
     search_precision,
 )
-from modeling.fitting.texture_grid import TextureGrid, texture_grid
-from modeling.models.fit_summary import FitSummary
-from modeling.models.grid import Condition
-from modeling.models.texture_model import TextureModel
-from modeling.recordings.spectrum import Spectrum
+from tactileq.modeling.fitting.texture_grid import TextureGrid, texture_grid
+from tactileq.modeling.models.fit_summary import FitSummary
+from tactileq.modeling.models.grid import Condition
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.recordings.spectrum import Spectrum
 
 # What doubling does: see `layer_search`. Where nothing is said, nothing changed there.
 EM_ROUNDS = 3  # doubled: ±1 % on single surfaces, 1.3 times the time

@@ -17,12 +17,12 @@ from itertools import product
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.equalizer.signs import neighbouring_patterns
-from modeling.estimation.coherent import Climbed, Observed, climb, observe, without_layer
-from modeling.estimation.given_count import starts_of
-from modeling.estimation.likelihood import NEPER_POWER_DB, split
-from modeling.fitting.field import (
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.signs import neighbouring_patterns
+from tactileq.modeling.estimation.coherent import Climbed, Observed, climb, observe, without_layer
+from tactileq.modeling.estimation.given_count import starts_of
+from tactileq.modeling.estimation.likelihood import NEPER_POWER_DB, split
+from tactileq.modeling.fitting.field import (
     FieldFit,
     effective_parameters,
     fit_field,
@@ -30,13 +30,13 @@ from modeling.fitting.field import (
     prior_covariance,
     updated_precision,
 )
-from modeling.fitting.growth import (
+from tactileq.modeling.fitting.growth import (
     CLEAR_EVIDENCE,
     candidates,
     inserted,
     inserted_independently,
 )
-from modeling.fitting.texture_grid import TextureGrid
+from tactileq.modeling.fitting.texture_grid import TextureGrid
 
 MOST_LAYERS = 12
 # Chosen on drawn surfaces and planted random spectra. What doubling does was looked at on 11 drawn

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats, Integers
-from modeling.estimation.layers import EstimatorName, Layers
-from modeling.estimation.paper import find_peak_frequencies, fit_layers
-from modeling.models.grid import Condition, fill_grid, grid_axes
-from modeling.recordings.spectrum import Spectrum
+from tactileq.modeling.arrays import Bools, Floats, Integers
+from tactileq.modeling.estimation.layers import EstimatorName, Layers
+from tactileq.modeling.estimation.paper import find_peak_frequencies, fit_layers
+from tactileq.modeling.models.grid import Condition, fill_grid, grid_axes
+from tactileq.modeling.recordings.spectrum import Spectrum
 
 
 def paper_arrays(

@@ -14,14 +14,14 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from modeling.estimation.likelihood import NEPER_POWER_DB, Power, signal_power
-from modeling.fitting.conditions import only_unit, recording_spectra, spectra_by_condition
-from modeling.models.grid import Condition
-from modeling.recordings.recording import Recording
-from modeling.recordings.recording_set import RecordingSet
-from modeling.recordings.spectrum import Spectrum, mean_spectrum
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.estimation.likelihood import NEPER_POWER_DB, Power, signal_power
+from tactileq.modeling.fitting.conditions import only_unit, recording_spectra, spectra_by_condition
+from tactileq.modeling.models.grid import Condition
+from tactileq.modeling.recordings.recording import Recording
+from tactileq.modeling.recordings.recording_set import RecordingSet
+from tactileq.modeling.recordings.spectrum import Spectrum, mean_spectrum
 
 # A band is no narrower than this many lines and this share of its frequency.
 BAND_LINES, BAND_SHARE = 4, 0.04

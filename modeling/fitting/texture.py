@@ -8,19 +8,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling.checks import is_whole
-from modeling.errors import InputError, shown
-from modeling.estimation.layers import EstimatorName, check_estimator
-from modeling.estimation.likelihood import is_silent
-from modeling.fitting.conditions import only_unit, recording_spectra, spectra_by_condition
-from modeling.fitting.joint_grid import GridFit, fit_grid_jointly, refit_grid_jointly
-from modeling.fitting.layer_search import MOST_LAYERS
-from modeling.fitting.paper_naming import paper_arrays
-from modeling.models.grid import Condition, check_spanned, grid_axes
-from modeling.models.texture_model import TextureModel
-from modeling.recordings.recording import Recording
-from modeling.recordings.recording_set import RecordingSet
-from modeling.recordings.spectrum import Spectrum, mean_spectrum
+from tactileq.modeling.checks import is_whole
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.estimation.layers import EstimatorName, check_estimator
+from tactileq.modeling.estimation.likelihood import is_silent
+from tactileq.modeling.fitting.conditions import only_unit, recording_spectra, spectra_by_condition
+from tactileq.modeling.fitting.joint_grid import GridFit, fit_grid_jointly, refit_grid_jointly
+from tactileq.modeling.fitting.layer_search import MOST_LAYERS
+from tactileq.modeling.fitting.paper_naming import paper_arrays
+from tactileq.modeling.models.grid import Condition, check_spanned, grid_axes
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.recordings.recording import Recording
+from tactileq.modeling.recordings.recording_set import RecordingSet
+from tactileq.modeling.recordings.spectrum import Spectrum, mean_spectrum
 
 
 def fit_texture(

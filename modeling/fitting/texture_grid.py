@@ -8,14 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats, Integers
-from modeling.estimation.coherent import Observed, limits_of, observe
-from modeling.estimation.likelihood import LOWEST_FITTED_HZ, NEPER_DB, Power, signal_power, split
-from modeling.fitting.blending import Middles
-from modeling.fitting.equations import Corners, cells, corners_of
-from modeling.fitting.field import Field
-from modeling.models.grid import Condition
-from modeling.recordings.spectrum import Spectrum
+from tactileq.modeling.arrays import Bools, Floats, Integers
+from tactileq.modeling.estimation.coherent import Observed, limits_of, observe
+from tactileq.modeling.estimation.likelihood import LOWEST_FITTED_HZ, NEPER_DB, Power, signal_power, split
+from tactileq.modeling.fitting.blending import Middles
+from tactileq.modeling.fitting.equations import Corners, cells, corners_of
+from tactileq.modeling.fitting.field import Field
+from tactileq.modeling.models.grid import Condition
+from tactileq.modeling.recordings.spectrum import Spectrum
 
 # On larger grids layers are searched on every second or third node of either axis, so many at most.
 COARSE_NODES = 4

@@ -8,19 +8,19 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Bools, Floats, no_marks
-from modeling.checks import check_rate
-from modeling.errors import InputError
-from modeling.files.described import key
-from modeling.files.kinds import Rate, Simulated, TextureName, Unit
-from modeling.files.saved_model import SavedModel
-from modeling.models.grid import Cells, Forces, Speeds, within_grid
-from modeling.models.line_spectral import (
+from tactileq.modeling.arrays import Bools, Floats, no_marks
+from tactileq.modeling.checks import check_rate
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.files.described import key
+from tactileq.modeling.files.kinds import Rate, Simulated, TextureName, Unit
+from tactileq.modeling.files.saved_model import SavedModel
+from tactileq.modeling.models.grid import Cells, Forces, Speeds, within_grid
+from tactileq.modeling.models.line_spectral import (
     check_line_spectral,
     prediction_coefficients,
     reflection_coefficients,
 )
-from modeling.models.parameter_table import flushed_to_zero
+from tactileq.modeling.models.parameter_table import flushed_to_zero
 
 
 class ARParameters(NamedTuple):

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from modeling.files.described import FileSection, key
-from modeling.files.kinds import Name
+from tactileq.modeling.files.described import FileSection, key
+from tactileq.modeling.files.kinds import Name
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from modeling.files.described import FileSection, key
+from tactileq.modeling.files.described import FileSection, key
 
 _Distance = Annotated[float, key(unit="dB", ge=0, as_given=True)]
 

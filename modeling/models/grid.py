@@ -11,10 +11,10 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Bools, Floats, Integers
-from modeling.errors import GridError, InputError
-from modeling.files.described import key
-from modeling.hand import Hand
+from tactileq.modeling.arrays import Bools, Floats, Integers
+from tactileq.modeling.errors import GridError, InputError
+from tactileq.modeling.files.described import key
+from tactileq.modeling.hand import Hand
 
 Condition = tuple[float, float]
 LEAST_REACH = 0.01  # of log speed or log force, of conditions that are not all the same

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
 
 
 def check_line_spectral(frequencies: Floats, what: str) -> None:

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TypeVar
 
-from modeling.errors import InputError, shown
-from modeling.files.documents import read_json_object
-from modeling.models.ar_model import ARModel
-from modeling.models.regressed_model import RegressedModel
-from modeling.models.texture_model import TextureModel
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.files.documents import read_json_object
+from tactileq.modeling.models.ar_model import ARModel
+from tactileq.modeling.models.regressed_model import RegressedModel
+from tactileq.modeling.models.texture_model import TextureModel
 
 Layered = TextureModel | RegressedModel
 AnyModel = Layered | ARModel

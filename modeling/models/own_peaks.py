@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats, Integers
-from modeling.equalizer.bands import band_response
-from modeling.equalizer.peq import PEQ
-from modeling.models.texture_model import TextureModel
+from tactileq.modeling.arrays import Bools, Floats, Integers
+from tactileq.modeling.equalizer.bands import band_response
+from tactileq.modeling.equalizer.peq import PEQ
+from tactileq.modeling.models.texture_model import TextureModel
 
 POINTS = 400
 LEAST_REACH_HZ = 10.0

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from modeling.models.grid import Cells, within_grid
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.models.grid import Cells, within_grid
 
 # Between nodes of a logarithmic table neither the axis nor a parameter changes by more than 3 dB;
 # read linearly, a power law is then met to 0.27 dB along each axis. But a cell has at most eight

@@ -11,17 +11,17 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
-from modeling.equalizer.peq import PEQ
-from modeling.errors import InputError
-from modeling.files.described import key
-from modeling.files.kinds import Rate, Simulated, TextureName, Unit
-from modeling.files.saved_model import SavedModel
-from modeling.models.compiled_for import CompiledFor
-from modeling.models.grid import Forces, Speeds
-from modeling.models.parameter_table import Parameters, ParameterTable
-from modeling.models.terms import CENTROID, DRIVING_TERMS, DrivenBy
-from modeling.models.texture_model import first_peq
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.peq import PEQ
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.files.described import key
+from tactileq.modeling.files.kinds import Rate, Simulated, TextureName, Unit
+from tactileq.modeling.files.saved_model import SavedModel
+from tactileq.modeling.models.compiled_for import CompiledFor
+from tactileq.modeling.models.grid import Forces, Speeds
+from tactileq.modeling.models.parameter_table import Parameters, ParameterTable
+from tactileq.modeling.models.terms import CENTROID, DRIVING_TERMS, DrivenBy
+from tactileq.modeling.models.texture_model import first_peq
 
 _COEFFICIENTS = ("noise_gain", "frequencies_hz", "bandwidths_hz", "amplitudes", "centroid_hz")
 _LAYERS = "coefficients layers"
@@ -29,7 +29,7 @@ _LAYERS = "coefficients layers"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RegressedModel(SavedModel):
-    """Coefficients of every PEQ parameter of one texture with m layers; see `modeling.regressed`.
+    """Coefficients of every PEQ parameter of one texture with m layers; see `tactileq.modeling.regressed`.
 
     With driven_by="conditions" every parameter is β + α1·v + α2·F + α3·v·F (eq. 3), k = 4; with
     "centroid" it is p0 + p1·SC(v), k = 2, and SC(v) = c0 + c1·v. What a reduced model leaves out

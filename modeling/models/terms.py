@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from modeling.errors import InputError, shown
+from tactileq.modeling.errors import InputError, shown
 
 DrivenBy = Literal["conditions", "centroid"]
 CENTROID = "centroid"

@@ -9,18 +9,18 @@ from typing import Annotated, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Bools, Floats, no_marks
-from modeling.checks import check_rate
-from modeling.equalizer.bands import check_bands, clamp_bands
-from modeling.equalizer.peq import PEQ
-from modeling.errors import InputError
-from modeling.files.described import key
-from modeling.files.kinds import Rate, Simulated, TextureName, Unit
-from modeling.files.saved_model import SavedModel
-from modeling.models.compiled_for import CompiledFor
-from modeling.models.fit_summary import FitSummary
-from modeling.models.grid import Forces, Speeds
-from modeling.models.parameter_table import (
+from tactileq.modeling.arrays import Bools, Floats, no_marks
+from tactileq.modeling.checks import check_rate
+from tactileq.modeling.equalizer.bands import check_bands, clamp_bands
+from tactileq.modeling.equalizer.peq import PEQ
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.files.described import key
+from tactileq.modeling.files.kinds import Rate, Simulated, TextureName, Unit
+from tactileq.modeling.files.saved_model import SavedModel
+from tactileq.modeling.models.compiled_for import CompiledFor
+from tactileq.modeling.models.fit_summary import FitSummary
+from tactileq.modeling.models.grid import Forces, Speeds
+from tactileq.modeling.models.parameter_table import (
     Parameters,
     ParameterTable,
     logarithmic_nodes,
@@ -73,7 +73,7 @@ class TextureModel(SavedModel):
         Bools, key("frequency taken over from the reference condition", shape=_LAYERS)
     ] = field(default_factory=no_marks)
     unresolved: Annotated[
-        Bools, key("width or level not resolved (see `modeling.Layers`)", shape=_LAYERS)
+        Bools, key("width or level not resolved (see `tactileq.modeling.Layers`)", shape=_LAYERS)
     ] = field(default_factory=no_marks)
     interpolated: Annotated[
         Bools,

@@ -12,10 +12,10 @@ from functools import cache, partial
 import numpy as np
 from scipy.special import ndtr
 
-from modeling.arrays import Bools, Floats
-from modeling.checks import is_whole
-from modeling.errors import InputError, shown
-from modeling.participants.effects import (
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.checks import is_whole
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.participants.effects import (
     EffectMixture,
     EffectPriors,
     drawn_effects,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from modeling.arrays import Floats, Integers
+from tactileq.modeling.arrays import Floats, Integers
 
 COMPONENTS = 3
 

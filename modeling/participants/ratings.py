@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats
-from modeling.files.answer_tables import ENDS
-from modeling.participants.effects import (
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.files.answer_tables import ENDS
+from tactileq.modeling.participants.effects import (
     EffectMixture,
     EffectPriors,
     drawn_effects,

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.equalizer.bands import band_rms
-from modeling.equalizer.peq import PEQ
-from modeling.models.texture_model import TextureModel
-from modeling.perception.verdicts import CriterionName
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.bands import band_rms
+from tactileq.modeling.equalizer.peq import PEQ
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.perception.verdicts import CriterionName
 
 PAPER_RECORD_S = 1.0
 
@@ -24,7 +24,7 @@ def layer_amplitudes_g(model: TextureModel | PEQ, *, criterion: CriterionName) -
     `energy`: the sinusoid of equal power, √2·G·√(k/(1+k)). `paper-fft`: the single-sided FFT
     amplitude of the peak in a record of 1 s, G·√(π/N). `paper-gain`: G itself
     (docs/method/perception.md#criteria). By the paper's two it is what decides; by `energy` it is
-    so only of a layer without others and without noise (`modeling.perception.power_changes`).
+    so only of a layer without others and without noise (`tactileq.modeling.perception.power_changes`).
     """
     gains = np.abs(model.gains)
     if criterion == "paper-gain":

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats, Integers
-from modeling.errors import counted
-from modeling.models.texture_model import TextureModel
-from modeling.perception.amplitudes import layer_amplitudes_g
-from modeling.perception.decisions import Decision, no_threshold_known
-from modeling.perception.dropping import HIGHEST_FLIP_PROBABILITY, flip_probabilities
-from modeling.perception.thresholds import Threshold
-from modeling.perception.verdicts import CriterionName
+from tactileq.modeling.arrays import Bools, Floats, Integers
+from tactileq.modeling.errors import counted
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.perception.amplitudes import layer_amplitudes_g
+from tactileq.modeling.perception.decisions import Decision, no_threshold_known
+from tactileq.modeling.perception.dropping import HIGHEST_FLIP_PROBABILITY, flip_probabilities
+from tactileq.modeling.perception.thresholds import Threshold
+from tactileq.modeling.perception.verdicts import CriterionName
 
 # `level_sd_db` is that of the energy. A gain is known less well: an error of it is mostly made up
 # for by one of the width. Cramér–Rao bound of a lone layer without floor: exactly twice.

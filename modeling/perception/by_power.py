@@ -9,13 +9,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.equalizer.peq import PEQ
-from modeling.errors import counted
-from modeling.models.parameter_table import Parameters
-from modeling.models.texture_model import TextureModel
-from modeling.perception.decisions import Decision, no_threshold_known
-from modeling.perception.dropping import (
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.peq import PEQ
+from tactileq.modeling.errors import counted
+from tactileq.modeling.models.parameter_table import Parameters
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.perception.decisions import Decision, no_threshold_known
+from tactileq.modeling.perception.dropping import (
     HIGHEST_FLIP_PROBABILITY,
     Dropping,
     Judge,
@@ -23,9 +23,9 @@ from modeling.perception.dropping import (
     Recorded,
     SetsOfLayers,
 )
-from modeling.perception.power_changes import PowerChange, PowerChanges
-from modeling.perception.signs_of_rest import SignsOfRest, at_conditions
-from modeling.perception.thresholds import Threshold
+from tactileq.modeling.perception.power_changes import PowerChange, PowerChanges
+from tactileq.modeling.perception.signs_of_rest import SignsOfRest, at_conditions
+from tactileq.modeling.perception.thresholds import Threshold
 
 
 def judge_of(

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats
-from modeling.errors import counted
-from modeling.perception.thresholds import Threshold
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.errors import counted
+from tactileq.modeling.perception.thresholds import Threshold
 
 
 class Decision(NamedTuple):

@@ -9,11 +9,11 @@ from itertools import combinations
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats
-from modeling.equalizer.bands import band_rms
-from modeling.models.parameter_table import Parameters
-from modeling.perception.power_changes import PowerChange, PowerChanges
-from modeling.perception.signs_of_rest import SignsOfRest
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.equalizer.bands import band_rms
+from tactileq.modeling.models.parameter_table import Parameters
+from tactileq.modeling.perception.power_changes import PowerChange, PowerChanges
+from tactileq.modeling.perception.signs_of_rest import SignsOfRest
 
 HIGHEST_FLIP_PROBABILITY = 0.05
 MOST_GROUPS = 6  # of layers, all unions of which are looked at

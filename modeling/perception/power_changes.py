@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling.arrays import Bools, Floats
-from modeling.equalizer.bands import clamp_bands, rational_tan
-from modeling.models.parameter_table import Parameters
-from modeling.perception.thresholds import Threshold
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.equalizer.bands import clamp_bands, rational_tan
+from tactileq.modeling.models.parameter_table import Parameters
+from tactileq.modeling.perception.thresholds import Threshold
 
 # Edges of the cells of the quadrature: over the whole range, and around each layer at
 # sinh(u) half-widths from its centre, so that its top and its skirts are both resolved.

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from modeling.perception.thresholds import Threshold
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.perception.thresholds import Threshold
 
 
 class SensationLevel(NamedTuple):

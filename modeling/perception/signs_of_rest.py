@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.equalizer.bands import band_response
-from modeling.equalizer.signs import neighbouring_patterns
-from modeling.models.parameter_table import Parameters
-from modeling.models.texture_model import TextureModel
-from modeling.similarity import HIGHEST_SHARE, LOWEST_HZ
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.bands import band_response
+from tactileq.modeling.equalizer.signs import neighbouring_patterns
+from tactileq.modeling.models.parameter_table import Parameters
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.similarity import HIGHEST_SHARE, LOWEST_HZ
 
 SIGN_POINTS = 120
 TINY = 1e-100

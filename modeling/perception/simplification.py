@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats
-from modeling.errors import InputError, shown
-from modeling.models.own_peaks import own_peaks
-from modeling.models.texture_model import TextureModel
-from modeling.perception.by_amplitude import amplitude_distances, decided_by_amplitude
-from modeling.perception.by_power import decided_by_power, distances_alone, judge_of
-from modeling.perception.decisions import Decision
-from modeling.perception.signs_of_rest import with_signs_chosen_again
-from modeling.perception.thresholds import Threshold
-from modeling.perception.verdicts import CRITERIA, CriterionName, LayerVerdict, Simplification
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.models.own_peaks import own_peaks
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.perception.by_amplitude import amplitude_distances, decided_by_amplitude
+from tactileq.modeling.perception.by_power import decided_by_power, distances_alone, judge_of
+from tactileq.modeling.perception.decisions import Decision
+from tactileq.modeling.perception.signs_of_rest import with_signs_chosen_again
+from tactileq.modeling.perception.thresholds import Threshold
+from tactileq.modeling.perception.verdicts import CRITERIA, CriterionName, LayerVerdict, Simplification
 
 
 def distances_db(
@@ -61,7 +61,7 @@ def simplify(
 
     Where no threshold is known a layer is kept; but above the table's end its last level is held
     as a lower bound, below which a layer may be dropped. A layer that only fills another's shape
-    (`modeling.models.own_peaks`) is dropped with that one or not at all. The noise and at least
+    (`tactileq.modeling.models.own_peaks`) is dropped with that one or not at all. The noise and at least
     one layer are always kept (PAPER V).
 
     Parameters

@@ -14,13 +14,13 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
-from modeling.errors import InputError, shown
-from modeling.files.columns import ABOVE_0, Column, chosen
-from modeling.files.described import FileSection, key
-from modeling.files.hashes import sha256_of_values
-from modeling.files.reading import read_text
-from modeling.files.tables import read_cells, typed
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.files.columns import ABOVE_0, Column, chosen
+from tactileq.modeling.files.described import FileSection, key
+from tactileq.modeling.files.hashes import sha256_of_values
+from tactileq.modeling.files.reading import read_text
+from tactileq.modeling.files.tables import read_cells, typed
 
 STANDARD_GRAVITY_M_S2 = 9.80665
 SHIPPED = ("codec", "pen-hold", "mobile")
@@ -177,7 +177,7 @@ class Threshold(FileSection):
                 "give one of them."
             )
         with resources.as_file(
-            resources.files("modeling.perception") / "shipped" / f"{name}.tsv"
+            resources.files("tactileq.modeling.perception") / "shipped" / f"{name}.tsv"
         ) as path:
             return Threshold.load(path)
 

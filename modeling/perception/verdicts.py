@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from modeling.errors import InputError
-from modeling.files.described import FileSection, key
-from modeling.files.described_json import DescribedJson
-from modeling.files.hashes import sha256_of_values
-from modeling.models.texture_model import TextureModel
-from modeling.perception.thresholds import Threshold
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.files.described import FileSection, key
+from tactileq.modeling.files.described_json import DescribedJson
+from tactileq.modeling.files.hashes import sha256_of_values
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.perception.thresholds import Threshold
 
 CriterionName = Literal["energy", "paper-fft", "paper-gain"]
 CRITERIA: tuple[CriterionName, ...] = ("energy", "paper-fft", "paper-gain")

@@ -9,16 +9,16 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from modeling.errors import InputError
-from modeling.files.columns import Column
-from modeling.files.folders import check_replaceable, replace_folder
-from modeling.files.places import behind_links, is_hidden, locked, unfinished_folder
-from modeling.files.reading import reason_of
-from modeling.files.syncing import sync_file, sync_folder
-from modeling.files.tables import read_cells, table_text
-from modeling.files.writing import write_files, write_text
-from modeling.recordings.recording import Recording
-from modeling.recordings.recording_set import (
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.files.columns import Column
+from tactileq.modeling.files.folders import check_replaceable, replace_folder
+from tactileq.modeling.files.places import behind_links, is_hidden, locked, unfinished_folder
+from tactileq.modeling.files.reading import reason_of
+from tactileq.modeling.files.syncing import sync_file, sync_folder
+from tactileq.modeling.files.tables import read_cells, table_text
+from tactileq.modeling.files.writing import write_files, write_text
+from tactileq.modeling.recordings.recording import Recording
+from tactileq.modeling.recordings.recording_set import (
     INDEX_NAME,
     RecordingSet,
     check_rounding,

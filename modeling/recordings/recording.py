@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Bools, Floats
-from modeling.checks import (
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.checks import (
     HIGHEST_FORCE_N,
     HIGHEST_SPEED_MM_S,
     LARGEST_VALUE,
@@ -17,7 +17,7 @@ from modeling.checks import (
     check_rate,
     check_texture_name,
 )
-from modeling.errors import InputError, shown
+from tactileq.modeling.errors import InputError, shown
 
 MIN_SAMPLES = 64
 

@@ -10,21 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.checks import (
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import (
     HIGHEST_FORCE_N,
     HIGHEST_RATE_HZ,
     HIGHEST_SPEED_MM_S,
     LOWEST_RATE_HZ,
 )
-from modeling.errors import InputError, counted, shortened, shown
-from modeling.files.columns import ABOVE_0, Column, chosen, number_in
-from modeling.files.documents import read_json_object
-from modeling.files.folders import check_replaceable, listed_file, replace_folder
-from modeling.files.reading import read_text
-from modeling.files.tables import read_cells, typed, write_table
-from modeling.files.wav import read_wav
-from modeling.recordings.recording import Recording
+from tactileq.modeling.errors import InputError, counted, shortened, shown
+from tactileq.modeling.files.columns import ABOVE_0, Column, chosen, number_in
+from tactileq.modeling.files.documents import read_json_object
+from tactileq.modeling.files.folders import check_replaceable, listed_file, replace_folder
+from tactileq.modeling.files.reading import read_text
+from tactileq.modeling.files.tables import read_cells, typed, write_table
+from tactileq.modeling.files.wav import read_wav
+from tactileq.modeling.recordings.recording import Recording
 
 INDEX_NAME = "recordings.tsv"
 INDEX_COLUMNS = (

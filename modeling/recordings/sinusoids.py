@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats
+from tactileq.modeling.arrays import Bools, Floats
 
 TIME_BANDWIDTH = 3.0
 TAPERS = 5

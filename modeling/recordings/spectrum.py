@@ -9,10 +9,10 @@ from typing import Literal
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from modeling.recordings.recording import Recording
-from modeling.recordings.sinusoids import Sinusoids, find_sinusoids, without_hum
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.recordings.recording import Recording
+from tactileq.modeling.recordings.sinusoids import Sinusoids, find_sinusoids, without_hum
 
 MODEL_RATE_HZ = 5000.0
 HIGH_PASS_HZ = 10.0

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Floats
+from tactileq.modeling.arrays import Floats
 
 SEGMENTS = 4
 FINE, PARTS = 0.005, 4  # cells of 2 % of the frequency, moved by quarters of one

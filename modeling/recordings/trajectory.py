@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError, shown
-from modeling.files.columns import Column, names
-from modeling.files.tables import read_table
-from modeling.hand import Hand
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.files.columns import Column, names
+from tactileq.modeling.files.tables import read_table
+from tactileq.modeling.hand import Hand
 
 LONGEST_S = 3600.0
 TRAJECTORY_COLUMNS = (

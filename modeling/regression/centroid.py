@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats
-from modeling.errors import InputError
-from modeling.models.terms import SPEED
-from modeling.models.texture_model import TextureModel
-from modeling.regression.least_squares import (
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.models.terms import SPEED
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.regression.least_squares import (
     ROUNDING,
     Regression,
     condition_predictors,

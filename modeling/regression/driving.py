@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.models.regressed_model import RegressedModel
-from modeling.models.terms import CENTROID, DRIVING_TERMS, SPEED, DrivenBy, check_driver
-from modeling.models.texture_model import TextureModel
-from modeling.regression.centroid import centroid_observations
-from modeling.regression.least_squares import Regression, reduced_regression
-from modeling.regression.parameters import (
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.models.regressed_model import RegressedModel
+from tactileq.modeling.models.terms import CENTROID, DRIVING_TERMS, SPEED, DrivenBy, check_driver
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.regression.centroid import centroid_observations
+from tactileq.modeling.regression.least_squares import Regression, reduced_regression
+from tactileq.modeling.regression.parameters import (
     AMPLITUDE,
     BANDWIDTH,
     FREQUENCY,

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Bools, Floats
-from modeling.errors import InputError
-from modeling.models.terms import FORCE, SPEED, SPEED_FORCE
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.models.terms import FORCE, SPEED, SPEED_FORCE
 
 ALPHA = 0.05
 # Of the largest value: what is smaller than this is rounding, and no response to anything.

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Bools, Floats
-from modeling.models.texture_model import TextureModel
-from modeling.regression.least_squares import (
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.regression.least_squares import (
     Regression,
     condition_predictors,
     reduced_regression,

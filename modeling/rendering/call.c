@@ -2,7 +2,7 @@
    render_on, texture, state, single)` holds addresses of the kernel's functions and of what they work on,
    and its method `render(speed, force, samples, out)` renders; speed and force are None for the hand as
    last read. It takes what needs no conversion and answers None to anything else;
-   modeling.rendering.renderer converts and refuses.
+   tactileq.modeling.rendering.renderer converts and refuses.
 
    Only Python's stable interface is used (setup.py defines Py_LIMITED_API): one build serves all versions.
 
@@ -18,7 +18,7 @@
 
 #define CHUNK 256 /* samples that are converted from one precision to the other at a time */
 #define WORTH_RELEASING 512     /* samples from which on other threads of Python may run meanwhile */
-#define MOST_SAMPLES 2147483648 /* MOST_SAMPLES of modeling.rendering.renderer */
+#define MOST_SAMPLES 2147483648 /* MOST_SAMPLES of tactileq.modeling.rendering.renderer */
 
 typedef void render_call(const void *texture, void *state, const void *speed, const void *force,
                          void *out, size_t count);
@@ -246,7 +246,7 @@ static PyType_Slot slots[] = {
 };
 
 static PyType_Spec call_type = {
-    .name = "modeling.rendering._call.Call",
+    .name = "tactileq.modeling.rendering._call.Call",
     .basicsize = sizeof(Call),
     .flags = Py_TPFLAGS_DEFAULT,
     .slots = slots,

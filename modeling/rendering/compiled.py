@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.engines import prefers_python
-from modeling.rendering.plan import LayeredModel, RenderCounters, RenderPlan
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.engines import prefers_python
+from tactileq.modeling.rendering.plan import LayeredModel, RenderCounters, RenderPlan
 
 try:
-    import modeling.rendering._kernel as _kernel
-    import modeling.rendering._kernel_single as _kernel_single
-    from modeling.rendering._call import Call
+    import tactileq.modeling.rendering._kernel as _kernel
+    import tactileq.modeling.rendering._kernel_single as _kernel_single
+    from tactileq.modeling.rendering._call import Call
 except ImportError:  # no compiler at installation
     _kernel = _kernel_single = Call = None
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import astuple, dataclass
 
-from modeling.rendering.interpolation import DOUBLING, PHASE
+from tactileq.modeling.rendering.interpolation import DOUBLING, PHASE
 
 # Of kernel.h: layers whose parameters are updated together, samples that are filtered in one go,
 # numbers of a layer's state.

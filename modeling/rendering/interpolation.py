@@ -12,8 +12,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
 
 MOST_PHASES = 4000
 DOUBLING, PHASE = 32, 10  # TQ_DOUBLING and TQ_PHASE of kernel.h

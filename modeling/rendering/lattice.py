@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from modeling.errors import InputError
-from modeling.models.ar_model import ARModel
-from modeling.models.parameter_table import wide_enough
-from modeling.rendering.plan import RenderPlan
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.models.ar_model import ARModel
+from tactileq.modeling.models.parameter_table import wide_enough
+from tactileq.modeling.rendering.plan import RenderPlan
 
 MOST_ORDER = 100  # fits go up to 40; the coefficients of one update take time with its square
 

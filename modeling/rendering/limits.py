@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from modeling.errors import InputError
+from tactileq.modeling.errors import InputError
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
-from modeling.errors import InputError, counted
-from modeling.hand import Hand
-from modeling.models.ar_model import ARModel
-from modeling.models.parameter_table import ParameterTable
-from modeling.rendering.compiled import filled_texture, is_compiled, render_counters
-from modeling.rendering.limits import Limits
-from modeling.rendering.noise import stream_key
-from modeling.rendering.plan import (
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError, counted
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.models.ar_model import ARModel
+from tactileq.modeling.models.parameter_table import ParameterTable
+from tactileq.modeling.rendering.compiled import filled_texture, is_compiled, render_counters
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.modeling.rendering.noise import stream_key
+from tactileq.modeling.rendering.plan import (
     LayeredModel,
     Notch,
     RenderCounters,
@@ -25,11 +25,11 @@ from modeling.rendering.plan import (
     plan_for,
     usual_update_s,
 )
-from modeling.rendering.renderer import Renderer, as_floats
-from modeling.threads import in_order, usable_cores
+from tactileq.modeling.rendering.renderer import Renderer, as_floats
+from tactileq.modeling.threads import in_order, usable_cores
 
 try:
-    from modeling.rendering._many import ffi, lib
+    from tactileq.modeling.rendering._many import ffi, lib
 except ImportError:  # no compiler at installation, or one without vectors
     lib = ffi = None
 

@@ -12,9 +12,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling.arrays import Floats
-from modeling.checks import is_whole
-from modeling.errors import InputError, shown
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import is_whole
+from tactileq.modeling.errors import InputError, shown
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)

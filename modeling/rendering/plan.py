@@ -9,14 +9,14 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling.arrays import Floats
-from modeling.checks import is_whole
-from modeling.errors import InputError, shown
-from modeling.models.compiled_for import CompiledFor
-from modeling.models.parameter_table import ParameterTable
-from modeling.rendering.cost import Cost, cost_of
-from modeling.rendering.interpolation import Interpolation, interpolation
-from modeling.rendering.limits import Limits
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import is_whole
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.models.compiled_for import CompiledFor
+from tactileq.modeling.models.parameter_table import ParameterTable
+from tactileq.modeling.rendering.cost import Cost, cost_of
+from tactileq.modeling.rendering.interpolation import Interpolation, interpolation
+from tactileq.modeling.rendering.limits import Limits
 
 UPDATE_S = 1e-3
 FADE_S = 5e-3

@@ -8,23 +8,23 @@ from typing import Any, Protocol, TypeVar, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from modeling.arrays import Floats
-from modeling.checks import is_number, is_whole
-from modeling.errors import InputError, shown
-from modeling.models.ar_model import ARModel
-from modeling.rendering.compiled import CompiledEngine, is_compiled
-from modeling.rendering.limits import Limits
-from modeling.rendering.noise import stream_key
-from modeling.rendering.plan import (
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import is_number, is_whole
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.models.ar_model import ARModel
+from tactileq.modeling.rendering.compiled import CompiledEngine, is_compiled
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.modeling.rendering.noise import stream_key
+from tactileq.modeling.rendering.plan import (
     LayeredModel,
     Notch,
     RenderCounters,
     plan_for,
     usual_update_s,
 )
-from modeling.rendering.reference.bands import BandFilter
-from modeling.rendering.reference.engine import PythonEngine
-from modeling.rendering.reference.lattice import LatticeFilter
+from tactileq.modeling.rendering.reference.bands import BandFilter
+from tactileq.modeling.rendering.reference.engine import PythonEngine
+from tactileq.modeling.rendering.reference.lattice import LatticeFilter
 
 MOST_SAMPLES = 2**31  # of one call
 Real = TypeVar("Real", np.float64, np.float32)

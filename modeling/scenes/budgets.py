@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from modeling.scenes.cost import scene_bytes
-from modeling.scenes.scene import Bound, Scene
-from modeling.scenes.search import Candidate, Search
+from tactileq.modeling.scenes.cost import scene_bytes
+from tactileq.modeling.scenes.scene import Bound, Scene
+from tactileq.modeling.scenes.search import Candidate, Search
 
 WIDEST = 64.0  # times the bound, within which the nearest one is looked for
 HALVINGS = 8

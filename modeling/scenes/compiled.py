@@ -7,17 +7,17 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from modeling.errors import InputError, shown
-from modeling.files.documents import dump_json, read_json_object
-from modeling.files.hashes import sha256_of_values
-from modeling.files.writing import file_stem, write_text
-from modeling.models.loading import Layered, load_model
-from modeling.models.texture_model import TextureModel
-from modeling.rendering.cost import Cost
-from modeling.rendering.plan import RenderPlan
-from modeling.rendering.renderer import Renderer
-from modeling.scenes.cost import Rendered, in_one_precision, scene_bytes
-from modeling.scenes.scene import Scene
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.files.documents import dump_json, read_json_object
+from tactileq.modeling.files.hashes import sha256_of_values
+from tactileq.modeling.files.writing import file_stem, write_text
+from tactileq.modeling.models.loading import Layered, load_model
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.rendering.cost import Cost
+from tactileq.modeling.rendering.plan import RenderPlan
+from tactileq.modeling.rendering.renderer import Renderer
+from tactileq.modeling.scenes.cost import Rendered, in_one_precision, scene_bytes
+from tactileq.modeling.scenes.scene import Scene
 
 FORMAT = "tactileq.compiled-scene"
 VERSION = 1

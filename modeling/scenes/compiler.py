@@ -11,13 +11,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from modeling.errors import InputError
-from modeling.models.texture_model import TextureModel
-from modeling.scenes.budgets import beyond_budget, within_budget
-from modeling.scenes.compiled import CompiledScene
-from modeling.scenes.results import compiled_texture
-from modeling.scenes.scene import Scene
-from modeling.scenes.search import ComputedModels, Search
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.scenes.budgets import beyond_budget, within_budget
+from tactileq.modeling.scenes.compiled import CompiledScene
+from tactileq.modeling.scenes.results import compiled_texture
+from tactileq.modeling.scenes.scene import Scene
+from tactileq.modeling.scenes.search import ComputedModels, Search
 
 
 def compile_scene(

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from modeling.models.loading import Layered
-from modeling.models.regressed_model import RegressedModel
-from modeling.rendering.plan import RenderPlan
+from tactileq.modeling.models.loading import Layered
+from tactileq.modeling.models.regressed_model import RegressedModel
+from tactileq.modeling.rendering.plan import RenderPlan
 
 Rendered = tuple[Layered, RenderPlan]
 

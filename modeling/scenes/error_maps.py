@@ -15,14 +15,14 @@ from itertools import pairwise, product
 
 import numpy as np
 
-from modeling.arrays import Floats, Integers
-from modeling.models.loading import Layered
-from modeling.models.parameter_table import Parameters
-from modeling.models.texture_model import TextureModel
-from modeling.rendering.compiled import is_compiled
-from modeling.rendering.renderer import Renderer
-from modeling.scenes.measures import ComparedBand, Errors, Features, errors_between
-from modeling.scenes.places import Places, nodes_of
+from tactileq.modeling.arrays import Floats, Integers
+from tactileq.modeling.models.loading import Layered
+from tactileq.modeling.models.parameter_table import Parameters
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.rendering.compiled import is_compiled
+from tactileq.modeling.rendering.renderer import Renderer
+from tactileq.modeling.scenes.measures import ComparedBand, Errors, Features, errors_between
+from tactileq.modeling.scenes.places import Places, nodes_of
 
 Segment = tuple[int, int]
 # Smallest displacement of a hand by a late update that is distinguished from none.

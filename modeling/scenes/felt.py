@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from modeling.errors import InputError, shown
-from modeling.models.parameter_table import Parameters
-from modeling.models.texture_model import TextureModel
-from modeling.perception.dropping import Judge, Recorded, SetsOfLayers
-from modeling.perception.power_changes import PowerChanges
-from modeling.perception.signs_of_rest import SignsOfRest
-from modeling.scenes.places import Places, enclosing
-from modeling.scenes.scene import Scene
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.models.parameter_table import Parameters
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.perception.dropping import Judge, Recorded, SetsOfLayers
+from tactileq.modeling.perception.power_changes import PowerChanges
+from tactileq.modeling.perception.signs_of_rest import SignsOfRest
+from tactileq.modeling.scenes.places import Places, enclosing
+from tactileq.modeling.scenes.scene import Scene
 
 
 def kept_layers(
@@ -26,7 +26,7 @@ def kept_layers(
 ) -> list[tuple[int, ...]]:
     """Every choice of layers to keep that drops nothing that is felt, smallest first.
 
-    As `modeling.simplify` decides by `energy`, at the places of the scene instead of the whole
+    As `tactileq.modeling.simplify` decides by `energy`, at the places of the scene instead of the whole
     grid, and of what the actuator plays. Of several choices of one size the one that changes least
     comes first.
 

@@ -12,12 +12,12 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
-from modeling.checks import HIGHEST_FORCE_N, HIGHEST_SPEED_MM_S, is_number
-from modeling.errors import InputError, shown
-from modeling.files.described import FileSection, key
-from modeling.files.hashes import sha256_of
-from modeling.recordings.trajectory import Trajectory, load_trajectory
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import HIGHEST_FORCE_N, HIGHEST_SPEED_MM_S, is_number
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.files.described import FileSection, key
+from tactileq.modeling.files.hashes import sha256_of
+from tactileq.modeling.recordings.trajectory import Trajectory, load_trajectory
 
 STROKE_HZ = 2.0
 FASTEST_STROKES_HZ = 20.0

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.rendering.limits import Limits
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.rendering.limits import Limits
 
 
 def limit_loss_db(rms: Floats, limits: Limits) -> Floats:

@@ -6,12 +6,12 @@ import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from modeling.errors import InputError, shortened
-from modeling.models.loading import Layered, load_models
-from modeling.models.texture_model import TextureModel
-from modeling.scenes.compiled import load_compiled
-from modeling.scenes.compiler import compile_scene
-from modeling.scenes.scene import Scene
+from tactileq.modeling.errors import InputError, shortened
+from tactileq.modeling.models.loading import Layered, load_models
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.scenes.compiled import load_compiled
+from tactileq.modeling.scenes.compiler import compile_scene
+from tactileq.modeling.scenes.scene import Scene
 
 
 def full_models(

@@ -14,15 +14,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling.arrays import Bools, Floats
-from modeling.equalizer.bands import clamp_bands, rational_tan
-from modeling.errors import InputError
-from modeling.models.parameter_table import Parameters
-from modeling.models.texture_model import TextureModel
-from modeling.recordings.spectrum import smooth
-from modeling.scenes.hands import Range
-from modeling.scenes.scene import Bound
-from modeling.similarity import BAND_EDGES_HZ, HIGHEST_SHARE, LOWEST_HZ, SIGMAS_HZ
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.equalizer.bands import clamp_bands, rational_tan
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.models.parameter_table import Parameters
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.recordings.spectrum import smooth
+from tactileq.modeling.scenes.hands import Range
+from tactileq.modeling.scenes.scene import Bound
+from tactileq.modeling.similarity import BAND_EDGES_HZ, HIGHEST_SHARE, LOWEST_HZ, SIGMAS_HZ
 
 BANDS = 9
 STEPS_HZ = (1.0, 5.0)  # of the frequency axis: a third of the narrowest layer, within these

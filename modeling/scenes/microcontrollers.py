@@ -9,10 +9,10 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from modeling.checks import check_rate
-from modeling.errors import InputError, shown
-from modeling.files.columns import ABOVE_0, Column
-from modeling.files.tables import read_table
+from tactileq.modeling.checks import check_rate
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.files.columns import ABOVE_0, Column
+from tactileq.modeling.files.tables import read_table
 
 CONTROLLER_COLUMNS = (
     Column("name", description="By which scenes name it", required=True),
@@ -94,7 +94,7 @@ class MicroController:
 
 @cache
 def _shipped() -> dict[str, MicroController]:
-    folder = resources.files("modeling.scenes") / "shipped"
+    folder = resources.files("tactileq.modeling.scenes") / "shipped"
     with resources.as_file(folder / "microcontrollers.tsv") as path:
         return load_microcontrollers(path)
 

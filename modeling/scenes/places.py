@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats, Integers
-from modeling.errors import InputError
-from modeling.hand import Hand
-from modeling.models.texture_model import TextureModel
-from modeling.scenes.hands import AskedRange, HandPlaces, HandRange, HandUse, Range
+from tactileq.modeling.arrays import Bools, Floats, Integers
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.scenes.hands import AskedRange, HandPlaces, HandRange, HandUse, Range
 
 LEAST_VISITED = 0.01  # of the hand's time, over which a bound may be broken
 

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.hand import Hand
-from modeling.models.grid import Cells
-from modeling.models.parameter_table import NEXT
-from modeling.models.texture_model import TextureModel
-from modeling.scenes.hands import Range
-from modeling.scenes.places import Places, nodes_of
-from modeling.scenes.thinning import Nodes
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.models.grid import Cells
+from tactileq.modeling.models.parameter_table import NEXT
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.scenes.hands import Range
+from tactileq.modeling.scenes.places import Places, nodes_of
+from tactileq.modeling.scenes.thinning import Nodes
 
 
 def played(model: TextureModel) -> TextureModel:

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from modeling.models.loading import Layered
-from modeling.perception.signs_of_rest import with_signs_chosen_again
-from modeling.rendering.plan import RenderPlan
-from modeling.scenes.compiled import Alternative, CompiledTexture, Measured, Step, Way
-from modeling.scenes.cost import stored_numbers
-from modeling.scenes.measures import Errors, errors_between
-from modeling.scenes.restricting import cut
-from modeling.scenes.search import Candidate, Search
+from tactileq.modeling.models.loading import Layered
+from tactileq.modeling.perception.signs_of_rest import with_signs_chosen_again
+from tactileq.modeling.rendering.plan import RenderPlan
+from tactileq.modeling.scenes.compiled import Alternative, CompiledTexture, Measured, Step, Way
+from tactileq.modeling.scenes.cost import stored_numbers
+from tactileq.modeling.scenes.measures import Errors, errors_between
+from tactileq.modeling.scenes.restricting import cut
+from tactileq.modeling.scenes.search import Candidate, Search
 
 _DRIVEN: dict[Way, str] = {
     "grid": "grid thinned",

@@ -12,15 +12,15 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from modeling.errors import InputError
-from modeling.files.described import DescribedFile, FileSection, key, keys_of, naming
-from modeling.files.hashes import sha256_of_values
-from modeling.files.kinds import Name, Rate, TextureNames
-from modeling.files.values import NameOrFile
-from modeling.perception.thresholds import Threshold
-from modeling.rendering.limits import Limits
-from modeling.scenes.hands import HandTable, HandUse, check_order
-from modeling.scenes.microcontrollers import MicroController
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.files.described import DescribedFile, FileSection, key, keys_of, naming
+from tactileq.modeling.files.hashes import sha256_of_values
+from tactileq.modeling.files.kinds import Name, Rate, TextureNames
+from tactileq.modeling.files.values import NameOrFile
+from tactileq.modeling.perception.thresholds import Threshold
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.modeling.scenes.hands import HandTable, HandUse, check_order
+from tactileq.modeling.scenes.microcontrollers import MicroController
 
 HIGHEST_MARGIN_DB = 100.0
 HIGHEST_BOUND_DB = 100.0

@@ -10,28 +10,28 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from modeling.models.compiled_for import CompiledFor
-from modeling.models.loading import Layered
-from modeling.models.own_peaks import own_peaks
-from modeling.models.parameter_table import NEXT
-from modeling.models.regressed_model import RegressedModel
-from modeling.models.terms import DrivenBy
-from modeling.models.texture_model import TextureModel
-from modeling.perception.signs_of_rest import SignsOfRest
-from modeling.regression.driving import regressed
-from modeling.rendering.plan import RenderPlan, plan_for
-from modeling.scenes.compiled import Way
-from modeling.scenes.cost import stored_numbers
-from modeling.scenes.error_maps import ErrorMaps
-from modeling.scenes.felt import at_places, kept_layers
-from modeling.scenes.limit_losses import limit_loss_db
-from modeling.scenes.measures import ComparedBand, Errors
-from modeling.scenes.places import places_of
-from modeling.scenes.restricting import played, thinned
-from modeling.scenes.scene import Bound, Scene
-from modeling.scenes.thinning import NO_LIMIT, fewest_nodes, table_numbers
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.models.compiled_for import CompiledFor
+from tactileq.modeling.models.loading import Layered
+from tactileq.modeling.models.own_peaks import own_peaks
+from tactileq.modeling.models.parameter_table import NEXT
+from tactileq.modeling.models.regressed_model import RegressedModel
+from tactileq.modeling.models.terms import DrivenBy
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.perception.signs_of_rest import SignsOfRest
+from tactileq.modeling.regression.driving import regressed
+from tactileq.modeling.rendering.plan import RenderPlan, plan_for
+from tactileq.modeling.scenes.compiled import Way
+from tactileq.modeling.scenes.cost import stored_numbers
+from tactileq.modeling.scenes.error_maps import ErrorMaps
+from tactileq.modeling.scenes.felt import at_places, kept_layers
+from tactileq.modeling.scenes.limit_losses import limit_loss_db
+from tactileq.modeling.scenes.measures import ComparedBand, Errors
+from tactileq.modeling.scenes.places import places_of
+from tactileq.modeling.scenes.restricting import played, thinned
+from tactileq.modeling.scenes.scene import Bound, Scene
+from tactileq.modeling.scenes.thinning import NO_LIMIT, fewest_nodes, table_numbers
 
 # A hand that touches, turns or lifts off is noticed at most so late.
 UPDATES_MS = (16.0, 8.0, 4.0, 2.0, 1.0, 0.5, 0.25)

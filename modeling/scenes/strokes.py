@@ -9,16 +9,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.hand import Hand
-from modeling.models.texture_model import TextureModel
-from modeling.rendering.renderer import Renderer
-from modeling.scenes.compiled import CompiledTexture
-from modeling.scenes.hands import STROKE_HZ, HandRange, HandUse
-from modeling.scenes.measures import ComparedBand, Features, errors_between
-from modeling.scenes.places import ranges_of
-from modeling.scenes.scene import Scene
-from modeling.seeds import generator
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.rendering.renderer import Renderer
+from tactileq.modeling.scenes.compiled import CompiledTexture
+from tactileq.modeling.scenes.hands import STROKE_HZ, HandRange, HandUse
+from tactileq.modeling.scenes.measures import ComparedBand, Features, errors_between
+from tactileq.modeling.scenes.places import ranges_of
+from tactileq.modeling.scenes.scene import Scene
+from tactileq.modeling.seeds import generator
 
 WINDOW_S = 1.0
 SETTLING_S = 0.5

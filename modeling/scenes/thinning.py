@@ -17,12 +17,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats, Integers
-from modeling.scenes.error_maps import ErrorMaps, Segment, segments_of
-from modeling.scenes.hands import Range
-from modeling.scenes.measures import Errors
-from modeling.scenes.places import Places, enclosing
-from modeling.scenes.scene import Bound
+from tactileq.modeling.arrays import Bools, Floats, Integers
+from tactileq.modeling.scenes.error_maps import ErrorMaps, Segment, segments_of
+from tactileq.modeling.scenes.hands import Range
+from tactileq.modeling.scenes.measures import Errors
+from tactileq.modeling.scenes.places import Places, enclosing
+from tactileq.modeling.scenes.scene import Bound
 
 Nodes = tuple[int, ...]
 NO_LIMIT = 2**62

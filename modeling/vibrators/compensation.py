@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from modeling.arrays import Floats
-from modeling.checks import check_rate
-from modeling.equalizer.bands import HIGHEST_BANDWIDTH_SHARE, band_response, rational_tan
-from modeling.errors import InputError
-from modeling.vibrators.vibrator import Vibrator, check_band, check_height
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import check_rate
+from tactileq.modeling.equalizer.bands import HIGHEST_BANDWIDTH_SHARE, band_response, rational_tan
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.vibrators.vibrator import Vibrator, check_band, check_height
 
 FLAT_WITHIN_DB = 3.0
 # What is left of a filter's past is negligible: −60 dB.

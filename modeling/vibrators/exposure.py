@@ -6,8 +6,8 @@ from math import pi, sqrt, tan
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.vibrators.vibrator import Vibrator
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.vibrators.vibrator import Vibrator
 
 STANDARD_GRAVITY_M_S2 = 9.80665
 DAY_S = 8 * 3600.0

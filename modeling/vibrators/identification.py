@@ -11,16 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from modeling.arrays import Floats
-from modeling.checks import check_rate
-from modeling.equalizer.peq import PEQ
-from modeling.errors import InputError
-from modeling.estimation.given_count import fit_layer_count
-from modeling.estimation.likelihood import EMPTY_BELOW_DB, HIGHEST_SHARE, LOWEST_FITTED_HZ
-from modeling.recordings.recording import clipped_samples
-from modeling.recordings.spectrum import HIGH_PASS_HZ, MODEL_RATE_HZ, Spectrum
-from modeling.vibrators.compensation import FLAT_WITHIN_DB
-from modeling.vibrators.vibrator import Vibrator
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import check_rate
+from tactileq.modeling.equalizer.peq import PEQ
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.estimation.given_count import fit_layer_count
+from tactileq.modeling.estimation.likelihood import EMPTY_BELOW_DB, HIGHEST_SHARE, LOWEST_FITTED_HZ
+from tactileq.modeling.recordings.recording import clipped_samples
+from tactileq.modeling.recordings.spectrum import HIGH_PASS_HZ, MODEL_RATE_HZ, Spectrum
+from tactileq.modeling.vibrators.compensation import FLAT_WITHIN_DB
+from tactileq.modeling.vibrators.vibrator import Vibrator
 
 SEGMENTS = 32
 # Hann windows that overlap by half share 1/6 of their information (Welch 1967).

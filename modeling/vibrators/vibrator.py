@@ -7,13 +7,13 @@ from typing import Annotated
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.equalizer.bands import check_bands
-from modeling.equalizer.peq import PEQ
-from modeling.errors import InputError
-from modeling.files.described import key
-from modeling.files.kinds import Rate, Simulated
-from modeling.files.saved_model import SavedModel
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.bands import check_bands
+from tactileq.modeling.equalizer.peq import PEQ
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.files.described import key
+from tactileq.modeling.files.kinds import Rate, Simulated
+from tactileq.modeling.files.saved_model import SavedModel
 
 _Positive = Annotated[float, key(gt=0)]
 

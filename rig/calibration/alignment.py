@@ -12,9 +12,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
-from modeling.checks import check_rate
-from modeling.errors import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import check_rate
+from tactileq.modeling.errors import InputError
 
 # A trace of what is played stands this far above what chance correlates.
 LEAST_CONTRAST = 8.0

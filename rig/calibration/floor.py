@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from modeling.recordings.sinusoids import MAINS_HZ, Sinusoids, mains_harmonics
-from rig.calibration.level import check_unclipped
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.recordings.sinusoids import MAINS_HZ, Sinusoids, mains_harmonics
+from tactileq.rig.calibration.level import check_unclipped
 
 SHORTEST_FLOOR_S = 2.0
 LOWEST_HZ = 10.0

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from modeling.seeds import generator
-from rig.live.memory import reading_ages_s
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.seeds import generator
+from tactileq.rig.live.memory import reading_ages_s
 
 AIM_MS = 20.0
 # Textures are felt to change at about 40 ms (Okamoto and others 2009).
@@ -230,7 +230,7 @@ def parts_of(reading_times_s: ArrayLike, blocks: np.ndarray, *, rate_hz: float) 
     ----------
     reading_times_s : (m,) array_like
         Of the hand's readings, rising.
-    blocks : (n,) array of rig.live.memory.BLOCK
+    blocks : (n,) array of tactileq.rig.live.memory.BLOCK
 
     Returns
     -------

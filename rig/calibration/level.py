@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from modeling.recordings.recording import clipped_samples
-from modeling.vibrators.identification import LEAST_COHERENCE, MOST_CLIPPED_SHARE
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.recordings.recording import clipped_samples
+from tactileq.modeling.vibrators.identification import LEAST_COHERENCE, MOST_CLIPPED_SHARE
 
 SEGMENT_S = 0.1
 LEAST_SEGMENTS = 8

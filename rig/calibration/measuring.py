@@ -10,10 +10,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from rig.capture.input import AudioInput, InputBlock
-from rig.sound.vibration import Presented
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.rig.capture.input import AudioInput, InputBlock
+from tactileq.rig.sound.vibration import Presented
 
 AROUND_S = 0.3
 LOST = "lost samples"
@@ -24,7 +24,7 @@ LEAST_FOR_RATE_S = 5.0
 
 
 class PlaysSignals(Protocol):
-    """What a measurement needs of `rig.sound.output.SoundOutput`."""
+    """What a measurement needs of `tactileq.rig.sound.output.SoundOutput`."""
 
     def play_signal(
         self, samples_g: ArrayLike, *, compensated: bool = False, wait: bool = False

@@ -6,15 +6,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
-from modeling.errors import InputError
-from rig.capture.input import AudioInput
-from rig.desk.lock import rig_locked
-from rig.desk.parts import hand_settings, input_settings, vibration_output
-from rig.hand.reader import HandReader
-from rig.live.memory import Live
-from rig.setup.rig_file import RigFile
-from rig.sound.supervision import SoundLost
-from rig.sound.vibration import VibrationOutput
+from tactileq.modeling.errors import InputError
+from tactileq.rig.capture.input import AudioInput
+from tactileq.rig.desk.lock import rig_locked
+from tactileq.rig.desk.parts import hand_settings, input_settings, vibration_output
+from tactileq.rig.hand.reader import HandReader
+from tactileq.rig.live.memory import Live
+from tactileq.rig.setup.rig_file import RigFile
+from tactileq.rig.sound.supervision import SoundLost
+from tactileq.rig.sound.vibration import VibrationOutput
 
 # With these points a pen's "force" is its pressure, as a share of its range.
 PRESSURE_ITSELF = ((0.0, 0.0), (1.0, 1.0))

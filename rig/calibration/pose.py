@@ -8,14 +8,14 @@ from datetime import date
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from rig.desk.parts import force_settings, hand_settings
-from rig.force.hand import ForceHand
-from rig.force.settings import Pose
-from rig.live.memory import GONE, Live
-from rig.setup.force_sections import PoseSection
-from rig.setup.rig_file import RigFile
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.rig.desk.parts import force_settings, hand_settings
+from tactileq.rig.force.hand import ForceHand
+from tactileq.rig.force.settings import Pose
+from tactileq.rig.live.memory import GONE, Live
+from tactileq.rig.setup.force_sections import PoseSection
+from tactileq.rig.setup.rig_file import RigFile
 
 SHORTEST_MM = 20.0
 LEAST_SINE = 0.3

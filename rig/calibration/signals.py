@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.checks import check_duration
-from modeling.errors import InputError
-from modeling.rendering.limits import Limits
-from modeling.seeds import generator, number_of
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import check_duration
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.modeling.seeds import generator, number_of
 
 FADE_S = 0.05
 # The peaks of a noise of RMS 1: one sample in four million is larger.

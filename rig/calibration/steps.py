@@ -10,20 +10,20 @@ import time
 
 import numpy as np
 
-from modeling.errors import InputError, counted
-from modeling.files.writing import write_text
-from modeling.vibrators.identification import identify_vibrator
-from modeling.vibrators.vibrator import Vibrator
-from rig.calibration.alignment import Aligned, aligned
-from rig.calibration.floor import Floor
-from rig.calibration.latency import LatencySummary
-from rig.calibration.level import BandGain, MeasuredLevel, band_gain, check_unclipped
-from rig.calibration.measuring import LOST, Accelerometer, PlaysSignals
-from rig.calibration.signals import noise_signal
-from rig.hand.pressure import PressureCurve
-from rig.live.memory import Live
-from rig.setup.figures import Curve, Figure
-from rig.setup.rig_file import RigFile
+from tactileq.modeling.errors import InputError, counted
+from tactileq.modeling.files.writing import write_text
+from tactileq.modeling.vibrators.identification import identify_vibrator
+from tactileq.modeling.vibrators.vibrator import Vibrator
+from tactileq.rig.calibration.alignment import Aligned, aligned
+from tactileq.rig.calibration.floor import Floor
+from tactileq.rig.calibration.latency import LatencySummary
+from tactileq.rig.calibration.level import BandGain, MeasuredLevel, band_gain, check_unclipped
+from tactileq.rig.calibration.measuring import LOST, Accelerometer, PlaysSignals
+from tactileq.rig.calibration.signals import noise_signal
+from tactileq.rig.hand.pressure import PressureCurve
+from tactileq.rig.live.memory import Live
+from tactileq.rig.setup.figures import Curve, Figure
+from tactileq.rig.setup.rig_file import RigFile
 
 BAND_HZ = (100.0, 500.0)
 IDENTIFICATION_BAND_HZ = (10.0, 2500.0)  # what a model holds; 10 Hz is their high-pass

@@ -9,12 +9,12 @@ from math import pi, sin
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from rig.force.hand import ForceHand
-from rig.force.states import State
-from rig.force.wall import LARGEST_MM, Wall
-from rig.live.memory import Live
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.rig.force.hand import ForceHand
+from tactileq.rig.force.states import State
+from tactileq.rig.force.wall import LARGEST_MM, Wall
+from tactileq.rig.live.memory import Live
 
 PRESS_S = 4.0  # up and down again
 SHARE = 0.6  # of the largest force of the device

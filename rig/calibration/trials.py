@@ -12,15 +12,15 @@ from pathlib import Path
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from modeling.models.texture_model import TextureModel
-from modeling.seeds import generator
-from rig.calibration.alignment import aligned
-from rig.calibration.latency import LAG_BIN_S, high_passed, onset_s, stroke_lag_s
-from rig.calibration.measuring import Accelerometer, PlaysSignals, Record
-from rig.calibration.signals import noise_signal
-from rig.live.memory import Live
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.models.texture_model import TextureModel
+from tactileq.modeling.seeds import generator
+from tactileq.rig.calibration.alignment import aligned
+from tactileq.rig.calibration.latency import LAG_BIN_S, high_passed, onset_s, stroke_lag_s
+from tactileq.rig.calibration.measuring import Accelerometer, PlaysSignals, Record
+from tactileq.rig.calibration.signals import noise_signal
+from tactileq.rig.live.memory import Live
 
 MODEL_RATE_HZ = 5000.0
 STEP_SPEED_MM_S = 150.0

@@ -9,7 +9,7 @@ from collections import deque
 
 import numpy as np
 
-from modeling.arrays import Floats
+from tactileq.modeling.arrays import Floats
 
 WINDOW_S = 30.0
 # A slope over less is worse than the nominal rate, which is off by 0.01 % at most in most cards.

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats
-from modeling.models.grid import Condition
-from rig.capture.grid import StrokeGrid
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.models.grid import Condition
+from tactileq.rig.capture.grid import StrokeGrid
 
 
 class Coverage:

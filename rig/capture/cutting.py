@@ -12,13 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling.arrays import Bools, Floats, Integers
-from modeling.checks import check_rate
-from modeling.errors import InputError
-from modeling.models.grid import Condition
-from modeling.recordings.recording import clipped_samples
-from rig.capture.grid import NOWHERE, StrokeGrid
-from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, READING, SIMULATED
+from tactileq.modeling.arrays import Bools, Floats, Integers
+from tactileq.modeling.checks import check_rate
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.models.grid import Condition
+from tactileq.modeling.recordings.recording import clipped_samples
+from tactileq.rig.capture.grid import NOWHERE, StrokeGrid
+from tactileq.rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, READING, SIMULATED
 
 SHORTEST_PART_S = 0.1
 # Half of what spectra are high-passed at, so that the filter changes nothing that is modelled.

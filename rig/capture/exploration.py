@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.checks import check_whole
-from modeling.errors import InputError
-from rig.capture.cutting import LONGEST_GAP_S, Readings, on_surface
-from rig.capture.grid import MOST_STEPS, StrokeGrid
-from rig.capture.recorder import RESTING_MM_S
-from rig.live.memory import FORCE_ASSUMED, SIMULATED
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import check_whole
+from tactileq.modeling.errors import InputError
+from tactileq.rig.capture.cutting import LONGEST_GAP_S, Readings, on_surface
+from tactileq.rig.capture.grid import MOST_STEPS, StrokeGrid
+from tactileq.rig.capture.recorder import RESTING_MM_S
+from tactileq.rig.live.memory import FORCE_ASSUMED, SIMULATED
 
 PERCENTILES = (5, 25, 50, 75, 95)
 LEAST_S = 5.0

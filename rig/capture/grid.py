@@ -14,17 +14,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Bools, Floats, Integers
-from modeling.checks import (
+from tactileq.modeling.arrays import Bools, Floats, Integers
+from tactileq.modeling.checks import (
     HIGHEST_FORCE_N,
     HIGHEST_SPEED_MM_S,
     check_keys,
     check_number,
     is_number,
 )
-from modeling.errors import InputError, shown
-from modeling.files.documents import read_toml
-from modeling.models.grid import Condition, check_axes
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.files.documents import read_toml
+from tactileq.modeling.models.grid import Condition, check_axes
 
 SPEEDS_MM_S = (50.0, 100.0, 150.0, 200.0, 250.0, 300.0, 350.0)
 FORCES_N = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling.arrays import Floats
-from modeling.checks import check_rate, check_whole, is_positive
-from modeling.errors import InputError, shortened, shown
-from rig.live.clock import called, now_s
-from rig.sound.devices import check_rate as check_device_rate
-from rig.sound.devices import find_device, portaudio
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import check_rate, check_whole, is_positive
+from tactileq.modeling.errors import InputError, shortened, shown
+from tactileq.rig.live.clock import called, now_s
+from tactileq.rig.sound.devices import check_rate as check_device_rate
+from tactileq.rig.sound.devices import find_device, portaudio
 
 BLOCK_S = 0.02
 MOST_CHANNELS = 64
@@ -80,7 +80,7 @@ class InputBlock:
     samples : (n,) ndarray
         Shares of full scale.
     time_s : float
-        When the first sample was measured, by `rig.live.clock.now_s`; the input latency is
+        When the first sample was measured, by `tactileq.rig.live.clock.now_s`; the input latency is
         taken off.
     lost : bool
         Whether samples are missing between the block before and this one.

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
 
 FADE_S = 0.02
 

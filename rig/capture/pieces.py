@@ -17,26 +17,26 @@ from typing import Any
 
 import numpy as np
 
-from modeling import Recording, RecordingSet
-from modeling.arrays import Floats
-from modeling.checks import check_duration, check_texture_name
-from modeling.errors import InputError, shown
-from modeling.files.columns import Column, chosen, names
-from modeling.files.folders import folder_behind
-from modeling.files.places import clear_unfinished, locked
-from modeling.files.provenance import PROVENANCE_NAME, provenance_text
-from modeling.files.reading import read_text
-from modeling.files.tables import read_cells, table_text, typed
-from modeling.files.wav import read_wav
-from modeling.files.writing import write_files
-from modeling.models.grid import Condition
-from modeling.recordings.appending import WavSource, append
-from modeling.recordings.recording_set import INDEX_COLUMNS
-from rig.capture.coverage import Coverage
-from rig.capture.cutting import SHORTEST_PART_S, StrokePart
-from rig.capture.grid import StrokeGrid
-from rig.capture.joining import joined, joined_samples
-from rig.capture.recorded import (
+from tactileq.modeling import Recording, RecordingSet
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import check_duration, check_texture_name
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.files.columns import Column, chosen, names
+from tactileq.modeling.files.folders import folder_behind
+from tactileq.modeling.files.places import clear_unfinished, locked
+from tactileq.modeling.files.provenance import PROVENANCE_NAME, provenance_text
+from tactileq.modeling.files.reading import read_text
+from tactileq.modeling.files.tables import read_cells, table_text, typed
+from tactileq.modeling.files.wav import read_wav
+from tactileq.modeling.files.writing import write_files
+from tactileq.modeling.models.grid import Condition
+from tactileq.modeling.recordings.appending import WavSource, append
+from tactileq.modeling.recordings.recording_set import INDEX_COLUMNS
+from tactileq.rig.capture.coverage import Coverage
+from tactileq.rig.capture.cutting import SHORTEST_PART_S, StrokePart
+from tactileq.rig.capture.grid import StrokeGrid
+from tactileq.rig.capture.joining import joined, joined_samples
+from tactileq.rig.capture.recorded import (
     begin_index,
     check_continues,
     recorded_conditions,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from modeling.errors import InputError
-from modeling.files.places import locked
-from modeling.files.tables import write_table
-from modeling.models.grid import Condition
-from modeling.recordings.recording_set import (
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.files.places import locked
+from tactileq.modeling.files.tables import write_table
+from tactileq.modeling.models.grid import Condition
+from tactileq.modeling.recordings.recording_set import (
     INDEX_COLUMNS,
     INDEX_NAME,
     listed,

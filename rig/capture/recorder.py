@@ -12,22 +12,22 @@ from typing import Protocol
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from modeling.models.grid import Condition
-from rig.capture.clock import SampleClock
-from rig.capture.coverage import Coverage, advice
-from rig.capture.cutting import (
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.models.grid import Condition
+from tactileq.rig.capture.clock import SampleClock
+from tactileq.rig.capture.coverage import Coverage, advice
+from tactileq.rig.capture.cutting import (
     CLIPPED_FROM,
     Readings,
     StrokeCutter,
     StrokePart,
     on_surface,
 )
-from rig.capture.grid import NOWHERE, StrokeGrid
-from rig.capture.input import InputBlock
-from rig.capture.pieces import PieceStore
-from rig.live.memory import FORCE_ASSUMED
+from tactileq.rig.capture.grid import NOWHERE, StrokeGrid
+from tactileq.rig.capture.input import InputBlock
+from tactileq.rig.capture.pieces import PieceStore
+from tactileq.rig.live.memory import FORCE_ASSUMED
 
 RECENT_S = 1.0
 # Slower than that a hand rests, or turns round.
@@ -40,7 +40,7 @@ JUDGED_FROM_S = 10.0
 
 
 class AccelerationSource(Protocol):
-    """Where blocks of acceleration come from, such as `rig.capture.input.AudioInput`."""
+    """Where blocks of acceleration come from, such as `tactileq.rig.capture.input.AudioInput`."""
 
     @property
     def running(self) -> bool:

@@ -6,13 +6,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import date
 
-from modeling import InputError
-from modeling.errors import shown
-from modeling.models.ar_model import ARModel
-from modeling.models.loading import AnyModel
-from modeling.rendering.lattice import lattice_fields
-from modeling.rendering.plan import plan_for
-from rig.setup.rig_file import RigFile
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.modeling.models.ar_model import ARModel
+from tactileq.modeling.models.loading import AnyModel
+from tactileq.modeling.rendering.lattice import lattice_fields
+from tactileq.modeling.rendering.plan import plan_for
+from tactileq.rig.setup.rig_file import RigFile
 
 HIGHEST_LATENCY_MS = 40.0  # textures are felt to change there (Okamoto and others 2009)
 
@@ -77,7 +77,7 @@ def check_models(rig: RigFile, models: Iterable[AnyModel]) -> None:
     ------
     InputError
         For one that is not in g, or of a higher rate than the card's; for an AR model that
-        `lattice_fields` refuses. Where a device renders it, as `rig.device.models.device_model`.
+        `lattice_fields` refuses. Where a device renders it, as `tactileq.rig.device.models.device_model`.
     """
     for model in models:
         if model.unit != "g":
@@ -99,7 +99,7 @@ def check_models(rig: RigFile, models: Iterable[AnyModel]) -> None:
 
 
 def _check_on_device(rig: RigFile, model: AnyModel) -> None:
-    from rig.device.models import ANY_DEVICE, device_model  # needs the extra rig
+    from tactileq.rig.device.models import ANY_DEVICE, device_model  # needs the extra rig
 
     device_model(model, ANY_DEVICE, limits=rig.safe_limits)
 

@@ -14,21 +14,21 @@ from typing import Any
 
 import numpy as np
 
-from modeling import InputError
-from modeling.arrays import Floats
-from modeling.models.loading import AnyModel
-from modeling.rendering.plan import RenderCounters
-from rig.desk.checks import Requirements, check_rig
-from rig.desk.journal import Journal
-from rig.desk.lock import rig_locked
-from rig.desk.parts import hand_reader, vibration_output
-from rig.desk.pen import Pen
-from rig.desk.stimuli import check_made_for, check_stimulus
-from rig.desk.walls import Walls, check_walls, usual_wall
-from rig.force.hand import ForceHand
-from rig.force.states import State
-from rig.hand.reader import HandReader
-from rig.interface import (
+from tactileq.modeling import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.models.loading import AnyModel
+from tactileq.modeling.rendering.plan import RenderCounters
+from tactileq.rig.desk.checks import Requirements, check_rig
+from tactileq.rig.desk.journal import Journal
+from tactileq.rig.desk.lock import rig_locked
+from tactileq.rig.desk.parts import hand_reader, vibration_output
+from tactileq.rig.desk.pen import Pen
+from tactileq.rig.desk.stimuli import check_made_for, check_stimulus
+from tactileq.rig.desk.walls import Walls, check_walls, usual_wall
+from tactileq.rig.force.hand import ForceHand
+from tactileq.rig.force.states import State
+from tactileq.rig.hand.reader import HandReader
+from tactileq.rig.interface import (
     Acceleration,
     Fault,
     HandRows,
@@ -40,12 +40,12 @@ from rig.interface import (
     ToneBurst,
     grid_of,
 )
-from rig.live.clock import now_s, sleep
-from rig.live.memory import GONE, OLDEST_READING_S, Live
-from rig.setup.rig_file import RigFile
-from rig.sound.signals import tone_burst
-from rig.sound.supervision import SoundLost
-from rig.sound.vibration import Presented, VibrationOutput
+from tactileq.rig.live.clock import now_s, sleep
+from tactileq.rig.live.memory import GONE, OLDEST_READING_S, Live
+from tactileq.rig.setup.rig_file import RigFile
+from tactileq.rig.sound.signals import tone_burst
+from tactileq.rig.sound.supervision import SoundLost
+from tactileq.rig.sound.vibration import Presented, VibrationOutput
 
 FIRST_READING_S = 5.0
 LOOK_S = 0.1  # interval of checks while waiting for a burst
@@ -63,7 +63,7 @@ class RigParts:
 
 
 class DeskRig:
-    """A rig of parts on a desk; implements `rig.interface.TextureRig`.
+    """A rig of parts on a desk; implements `tactileq.rig.interface.TextureRig`.
 
     What fails while it is open is reported by `take_faults`, and what was lost is started again by
     what is presented next. `read` and `take_faults` are the heartbeat: see `TextureRig`.

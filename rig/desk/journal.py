@@ -11,9 +11,9 @@ from math import inf, nan
 
 import numpy as np
 
-from modeling.arrays import Floats
-from rig.interface import SURFACES, HandRows, Surface
-from rig.live.memory import (
+from tactileq.modeling.arrays import Floats
+from tactileq.rig.interface import SURFACES, HandRows, Surface
+from tactileq.rig.live.memory import (
     BEYOND,
     BUTTON,
     FORCE_ASSUMED,

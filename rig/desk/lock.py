@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from modeling import InputError
-from modeling.errors import shown
-from modeling.files.hashes import sha256_of
-from modeling.files.locks import HeldError, Lock
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.hashes import sha256_of
+from tactileq.modeling.files.locks import HeldError, Lock
 
 
 @contextmanager

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from modeling import InputError
-from rig.desk.messages import Begin, End, Listening, Take, Taken
-from rig.desk.parts import input_settings
-from rig.interface import Acceleration
-from rig.live.child import Child, ChildLost, Reply
-from rig.live.messages import Done, Message
-from rig.setup.sections import AccelerometerSection
+from tactileq.modeling import InputError
+from tactileq.rig.desk.messages import Begin, End, Listening, Take, Taken
+from tactileq.rig.desk.parts import input_settings
+from tactileq.rig.interface import Acceleration
+from tactileq.rig.live.child import Child, ChildLost, Reply
+from tactileq.rig.live.messages import Done, Message
+from tactileq.rig.setup.sections import AccelerometerSection
 
 TAKE_S = 30.0
 
@@ -38,7 +38,7 @@ class Pen:
         InputError
             For a device, channel or rate that there is not.
         """
-        self._child = Child("rig.desk.pen_process", input_settings(self._section))
+        self._child = Child("tactileq.rig.desk.pen_process", input_settings(self._section))
         try:
             self._rate_hz = self._child.ready(Listening).rate_hz
         except ChildLost as lost:

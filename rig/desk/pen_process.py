@@ -1,6 +1,6 @@
 """The process that follows an accelerometer at the pen, and keeps what is asked for.
 
-It is driven by `rig.desk.messages`, and a process of its own since PortAudio may end, or stop
+It is driven by `tactileq.rig.desk.messages`, and a process of its own since PortAudio may end, or stop
 indefinitely, a process whose sound server dies.
 """
 
@@ -10,10 +10,10 @@ import threading
 
 import numpy as np
 
-from rig.capture.input import AudioInput, InputBlock, InputSettings
-from rig.desk.messages import Begin, End, Listening, Request, SampleBlock, Take, Taken
-from rig.live.driven import Parent
-from rig.live.messages import Done, Message
+from tactileq.rig.capture.input import AudioInput, InputBlock, InputSettings
+from tactileq.rig.desk.messages import Begin, End, Listening, Request, SampleBlock, Take, Taken
+from tactileq.rig.live.driven import Parent
+from tactileq.rig.live.messages import Done, Message
 
 LOOK_S = 0.25  # from one look at the input to the next
 RECENT_S = 2.0  # what is not asked for is forgotten after this time

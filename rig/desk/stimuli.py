@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from modeling import InputError
-from rig.desk.parts import vibration_output
-from rig.interface import PreparedSignal, Stimulus
-from rig.live.memory import Live
-from rig.setup.rig_file import RigFile
+from tactileq.modeling import InputError
+from tactileq.rig.desk.parts import vibration_output
+from tactileq.rig.interface import PreparedSignal, Stimulus
+from tactileq.rig.live.memory import Live
+from tactileq.rig.setup.rig_file import RigFile
 
 
 def check_stimulus(rig: RigFile, stimulus: Stimulus) -> None:

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import product
 
-from modeling import InputError
-from rig.force.wall import Wall, largest_stiffness_n_per_mm
-from rig.setup.force_sections import ForceSection
-from rig.setup.rig_file import RigFile
+from tactileq.modeling import InputError
+from tactileq.rig.force.wall import Wall, largest_stiffness_n_per_mm
+from tactileq.rig.setup.force_sections import ForceSection
+from tactileq.rig.setup.rig_file import RigFile
 
 MARGIN = 0.5  # of the largest stiffness, where nothing says which
 USUAL_MM = 100.0

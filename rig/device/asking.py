@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from modeling.errors import InputError
-from rig.device.definition import DEVICE
-from rig.wire.conversation import Conversation, Hello
-from rig.wire.definition import Definition, Value
-from rig.wire.transports import TransportLost, opened_transport
+from tactileq.modeling.errors import InputError
+from tactileq.rig.device.definition import DEVICE
+from tactileq.rig.wire.conversation import Conversation, Hello
+from tactileq.rig.wire.definition import Definition, Value
+from tactileq.rig.wire.transports import TransportLost, opened_transport
 
 STATED = ("Simulated", "State", "Cause")
 COUNTED = ("Tick", "ModelHash", "Number", "FramesBad", "RecordsLost")

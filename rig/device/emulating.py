@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Self
 
-from modeling.errors import InputError
-from rig.device.virtual import compiled_device
-from rig.wire.transports import SOCKET
+from tactileq.modeling.errors import InputError
+from tactileq.rig.device.virtual import compiled_device
+from tactileq.rig.wire.transports import SOCKET
 
 Kind = Literal["process", "m7", "stm32"]
 KINDS: tuple[Kind, ...] = ("process", "m7", "stm32")
@@ -170,10 +170,10 @@ class Emulator:
         """
         check_baud(self._kind, self._baud)
         what: str = self._kind
-        program = "rig.device.process"
+        program = "tactileq.rig.device.process"
         if self._kind == "process":
             compiled_device()  # where it is, the recorder is, too
-            program = "rig.recorder.process" if self._recorder else program
+            program = "tactileq.rig.recorder.process" if self._recorder else program
         else:
             self.firmware = self._built()
             what = f"{BOARDS[self._kind].machine}:{self.firmware}"

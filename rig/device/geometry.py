@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
-from modeling.checks import check_number
-from modeling.errors import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import check_number
+from tactileq.modeling.errors import InputError
 
 LEAST_DEPTH_MM = 1.0  # below the motors; at their height the cables are in line
 

@@ -6,15 +6,15 @@ import queue
 import threading
 from typing import Any
 
-from modeling.errors import InputError
-from rig.device.messages import DeviceAnswer, DeviceRequest, Wanted
-from rig.force.hand import ForceHand
-from rig.force.settings import ForceSettings
-from rig.hand.messages import Report
-from rig.hand.settings import HandSettings
-from rig.live.child import ChildLost
-from rig.live.clock import holding, next_of, now_s
-from rig.live.memory import Live
+from tactileq.modeling.errors import InputError
+from tactileq.rig.device.messages import DeviceAnswer, DeviceRequest, Wanted
+from tactileq.rig.force.hand import ForceHand
+from tactileq.rig.force.settings import ForceSettings
+from tactileq.rig.hand.messages import Report
+from tactileq.rig.hand.settings import HandSettings
+from tactileq.rig.live.child import ChildLost
+from tactileq.rig.live.clock import holding, next_of, now_s
+from tactileq.rig.live.memory import Live
 
 ANSWER_S = 20.0  # an upload through a slow port
 _LOOK_S = 0.02
@@ -23,7 +23,7 @@ _LOOK_S = 0.02
 class DeviceHand(ForceHand):
     """As `ForceHand`, of a device at the address that `force` holds."""
 
-    process = "rig.device.servo"
+    process = "tactileq.rig.device.servo"
     reports = Report | DeviceAnswer
 
     def __init__(self, live: Live, settings: HandSettings, force: ForceSettings) -> None:

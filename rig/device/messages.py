@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from modeling.rendering.plan import RenderCounters
-from rig.live.messages import Message
+from tactileq.modeling.rendering.plan import RenderCounters
+from tactileq.rig.live.messages import Message
 
 
 class Describe(Message, frozen=True):

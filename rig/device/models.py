@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modeling.errors import InputError
-from modeling.models.ar_model import ARModel
-from modeling.models.loading import AnyModel
-from modeling.rendering.limits import Limits
-from modeling.rendering.plan import Notch, plan_for
-from rig.device.definition import DEVICE
-from rig.setup.rig_file import DEVICE_RATE_HZ
-from rig.wire.conversation import Hello
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.models.ar_model import ARModel
+from tactileq.modeling.models.loading import AnyModel
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.modeling.rendering.plan import Notch, plan_for
+from tactileq.rig.device.definition import DEVICE
+from tactileq.rig.setup.rig_file import DEVICE_RATE_HZ
+from tactileq.rig.wire.conversation import Hello
 
 MOST_LAYERS = 8
 CAPACITY_REALS = 2048

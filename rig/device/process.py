@@ -1,4 +1,4 @@
-"""An emulated device: `python -m rig.device.process KIND BAUD PORT`, until its input ends.
+"""An emulated device: `python -m tactileq.rig.device.process KIND BAUD PORT`, until its input ends.
 
 It prints where the device is reached: the path of a pseudo-terminal, or socket://HOST:PORT where
 PORT is not 0. KIND is "process", or QEMU's machine and the firmware's file with a colon between.
@@ -17,8 +17,8 @@ import time
 import tty
 from contextlib import suppress
 
-from rig.device.virtual import VirtualBoard
-from rig.wire.transports import SOCKET
+from tactileq.rig.device.virtual import VirtualBoard
+from tactileq.rig.wire.transports import SOCKET
 
 HOST = "127.0.0.1"
 _INPUT = 0

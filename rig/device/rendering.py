@@ -7,10 +7,10 @@ from dataclasses import fields
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from modeling.rendering.plan import RenderCounters
-from rig.device.messages import (
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.rendering.plan import RenderCounters
+from tactileq.rig.device.messages import (
     CountCorrections,
     Describe,
     DeviceAnswer,
@@ -20,13 +20,13 @@ from rig.device.messages import (
     StopPlaying,
     Wanted,
 )
-from rig.device.registers import DeviceSource
-from rig.force.settings import Vibration
-from rig.live.clock import holding, now_s
-from rig.live.memory import BLOCK, HEARTBEAT_S, NO_HEARTBEAT, STALE, UNDERFLOW, Live
-from rig.setup.rig_file import DEVICE_RATE_HZ
-from rig.wire.conversation import DeviceRefused
-from rig.wire.link import Link
+from tactileq.rig.device.registers import DeviceSource
+from tactileq.rig.force.settings import Vibration
+from tactileq.rig.live.clock import holding, now_s
+from tactileq.rig.live.memory import BLOCK, HEARTBEAT_S, NO_HEARTBEAT, STALE, UNDERFLOW, Live
+from tactileq.rig.setup.rig_file import DEVICE_RATE_HZ
+from tactileq.rig.wire.conversation import DeviceRefused
+from tactileq.rig.wire.link import Link
 
 SAMPLES = 25  # of one frame
 AHEAD = 700  # samples that are sent before they are due; 1000 fit

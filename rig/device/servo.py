@@ -1,6 +1,6 @@
-"""A device that renders by itself in the place of a servo: `python -m rig.device.servo`.
+"""A device that renders by itself in the place of a servo: `python -m tactileq.rig.device.servo`.
 
-It is driven by `rig.force.messages` and speaks to the other processes of a rig as the servo of a
+It is driven by `tactileq.rig.force.messages` and speaks to the other processes of a rig as the servo of a
 force device does (rig/force/servo.h): what they ask for goes over the wire, and records come back
 as readings of the hand. The law runs in the device (docs/device.md#in-a-rig).
 """
@@ -10,24 +10,24 @@ from __future__ import annotations
 import threading
 from contextlib import suppress
 
-from modeling.errors import InputError
-from rig.device.definition import DEVICE
-from rig.device.messages import DeviceAnswer, DeviceRequest
-from rig.device.registers import DeviceCommand, DeviceFlags, DeviceStatus
-from rig.device.rendering import DevicePlayer
-from rig.force.realtime import SERVO_PRIORITY, real_time
-from rig.force.serving import ServedServo, serve_servo
-from rig.force.settings import ForceSettings
-from rig.force.states import Ask, Cause, State
-from rig.force.words import ServoWords
-from rig.hand.messages import Firmware, Ready
-from rig.live.clock import now_s, sleep, taking_part
-from rig.live.driven import Parent
-from rig.live.memory import BEYOND, BUTTON, CONTACT, FORCE_COMMANDED, SIMULATED, Live
-from rig.setup.rig_file import DEVICE_RATE_HZ
-from rig.wire.conversation import Block, DeviceRefused
-from rig.wire.link import Link
-from rig.wire.transports import opened_transport
+from tactileq.modeling.errors import InputError
+from tactileq.rig.device.definition import DEVICE
+from tactileq.rig.device.messages import DeviceAnswer, DeviceRequest
+from tactileq.rig.device.registers import DeviceCommand, DeviceFlags, DeviceStatus
+from tactileq.rig.device.rendering import DevicePlayer
+from tactileq.rig.force.realtime import SERVO_PRIORITY, real_time
+from tactileq.rig.force.serving import ServedServo, serve_servo
+from tactileq.rig.force.settings import ForceSettings
+from tactileq.rig.force.states import Ask, Cause, State
+from tactileq.rig.force.words import ServoWords
+from tactileq.rig.hand.messages import Firmware, Ready
+from tactileq.rig.live.clock import now_s, sleep, taking_part
+from tactileq.rig.live.driven import Parent
+from tactileq.rig.live.memory import BEYOND, BUTTON, CONTACT, FORCE_COMMANDED, SIMULATED, Live
+from tactileq.rig.setup.rig_file import DEVICE_RATE_HZ
+from tactileq.rig.wire.conversation import Block, DeviceRefused
+from tactileq.rig.wire.link import Link
+from tactileq.rig.wire.transports import opened_transport
 
 RECORDS_HZ = 1000
 TURN_S = 0.001

@@ -12,28 +12,28 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from modeling.models.loading import AnyModel
-from modeling.rendering.limits import Limits
-from modeling.vibrators.compensation import Compensation
-from rig.device.hand import DeviceHand
-from rig.device.messages import (
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.models.loading import AnyModel
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.modeling.vibrators.compensation import Compensation
+from tactileq.rig.device.hand import DeviceHand
+from tactileq.rig.device.messages import (
     CountCorrections,
     Describe,
     PlayModel,
     PlaySamples,
     StopPlaying,
 )
-from rig.device.models import ANY_DEVICE, device_model
-from rig.live.child import ChildLost
-from rig.live.clock import now_s, sleep
-from rig.live.memory import Live, Rows
-from rig.setup.rig_file import DEVICE_BLOCK_S, DEVICE_RATE_HZ
-from rig.sound.output import SoundOutput, check_masking
-from rig.sound.played import STALLED_S
-from rig.sound.supervision import HALTED, SoundLost
-from rig.sound.vibration import Counted, Presented, VibrationOutput
+from tactileq.rig.device.models import ANY_DEVICE, device_model
+from tactileq.rig.live.child import ChildLost
+from tactileq.rig.live.clock import now_s, sleep
+from tactileq.rig.live.memory import Live, Rows
+from tactileq.rig.setup.rig_file import DEVICE_BLOCK_S, DEVICE_RATE_HZ
+from tactileq.rig.sound.output import SoundOutput, check_masking
+from tactileq.rig.sound.played import STALLED_S
+from tactileq.rig.sound.supervision import HALTED, SoundLost
+from tactileq.rig.sound.vibration import Counted, Presented, VibrationOutput
 
 _POLL_S = 0.001
 Answer = TypeVar("Answer")

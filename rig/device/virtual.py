@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from modeling.errors import InputError
+from tactileq.modeling.errors import InputError
 
 try:
-    import rig.device._device as _device
+    import tactileq.rig.device._device as _device
 except ImportError:  # no compiler at installation
     _device = None
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from rig.force.states import Ask, Status
-from rig.force.wall import Wall
-from rig.live.clock import now_s, sleep
-from rig.live.compiled import compiled
-from rig.live.memory import Live
+from tactileq.rig.force.states import Ask, Status
+from tactileq.rig.force.wall import Wall
+from tactileq.rig.live.clock import now_s, sleep
+from tactileq.rig.live.compiled import compiled
+from tactileq.rig.live.memory import Live
 
 ANSWER_S = 0.1
 _LOOK_S = 0.0005

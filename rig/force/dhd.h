@@ -1,7 +1,7 @@
 /* The back end of Force Dimension's devices: omega, delta, sigma, Novint Falcon.
 
    The functions are those of the maker's library (libdhd, 3.3 or later), which the laboratory has
-   installed; `rig.force.dhd` finds them at run time. Metres and newtons; -1 is a failure, while
+   installed; `tactileq.rig.force.dhd` finds them at run time. Metres and newtons; -1 is a failure, while
    DHD_TIMEGUARD (1) and DHD_MOTOR_SATURATED (2) are none.
 
    Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */

@@ -15,10 +15,10 @@ from typing import Any
 
 from cffi import FFI
 
-from modeling.errors import InputError, shown
-from rig.force.settings import ForceSettings
-from rig.live.compiled import compiled
-from rig.setup.force_sections import STAND_IN
+from tactileq.modeling.errors import InputError, shown
+from tactileq.rig.force.settings import ForceSettings
+from tactileq.rig.live.compiled import compiled
+from tactileq.rig.setup.force_sections import STAND_IN
 
 UNTESTED = "untested on hardware"
 OLDEST = (3, 3)
@@ -206,7 +206,7 @@ def _char(number: int) -> bytes:
 
 def _stand_in() -> str:
     """Path of the stand-in, and the device of its own that it needs."""
-    from rig.force.standin import PLACE, device_path, library_path
+    from tactileq.rig.force.standin import PLACE, device_path, library_path
 
     os.environ[PLACE] = str(device_path())
     return library_path()

@@ -244,7 +244,7 @@ static inline void tq_force_tick(tq_force *f, const tq_sensed *sensed, tq_number
 }
 
 /* Up to which stiffness (N/mm) a wall that is sampled every `period_s` and answered `delay_s` later cannot
-   give energy to the hand; `rig.force.wall` has the source. */
+   give energy to the hand; `tactileq.rig.force.wall` has the source. */
 static inline tq_number tq_largest_stiffness(tq_number device_n_s_per_mm, tq_number wall_n_s_per_mm,
                                              tq_number period_s, tq_number delay_s)
 {

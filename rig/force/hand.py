@@ -5,19 +5,19 @@ from __future__ import annotations
 import threading
 from contextlib import suppress
 
-from modeling.errors import InputError
-from rig.force.control import Control
-from rig.force.messages import Acted, RunServo, Servo, Watch
-from rig.force.settings import UNWATCHED_S, ForceSettings
-from rig.force.states import Ask, Cause, State, Status
-from rig.force.wall import Wall
-from rig.hand.messages import Ready
-from rig.hand.reader import SILENT_S, START_S, HandReader
-from rig.hand.settings import HandSettings
-from rig.live.child import Child, ChildLost
-from rig.live.clock import check_clock, now_s, sleep
-from rig.live.memory import Live
-from rig.live.messages import Done
+from tactileq.modeling.errors import InputError
+from tactileq.rig.force.control import Control
+from tactileq.rig.force.messages import Acted, RunServo, Servo, Watch
+from tactileq.rig.force.settings import UNWATCHED_S, ForceSettings
+from tactileq.rig.force.states import Ask, Cause, State, Status
+from tactileq.rig.force.wall import Wall
+from tactileq.rig.hand.messages import Ready
+from tactileq.rig.hand.reader import SILENT_S, START_S, HandReader
+from tactileq.rig.hand.settings import HandSettings
+from tactileq.rig.live.child import Child, ChildLost
+from tactileq.rig.live.clock import check_clock, now_s, sleep
+from tactileq.rig.live.memory import Live
+from tactileq.rig.live.messages import Done
 
 START_ANEW_S = 2.0  # for a process that takes the place of another one
 _LOOK_S = 0.002
@@ -38,7 +38,7 @@ class ForceHand(HandReader):
     force : ForceSettings
     """
 
-    process = "rig.force.process"  # of the servo
+    process = "tactileq.rig.force.process"  # of the servo
 
     def __init__(self, live: Live, settings: HandSettings, force: ForceSettings) -> None:
         force.check_late()
@@ -163,7 +163,7 @@ class ForceHand(HandReader):
 
     def _start_watchdog(self) -> None:
         self._watchdog = dog = Child(
-            "rig.force.watchdog", Watch(live=str(self._live.path), settings=self._force)
+            "tactileq.rig.force.watchdog", Watch(live=str(self._live.path), settings=self._force)
         )
         try:
             dog.ready(Ready, within_s=START_S)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rig.force.settings import ForceSettings
-from rig.live.messages import Message
+from tactileq.rig.force.settings import ForceSettings
+from tactileq.rig.live.messages import Message
 
 
 class RunServo(Message, frozen=True, kw_only=True):

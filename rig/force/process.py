@@ -1,4 +1,4 @@
-"""The servo's process: `python -m rig.force.process`, driven by `rig.force.messages`.
+"""The servo's process: `python -m tactileq.rig.force.process`, driven by `tactileq.rig.force.messages`.
 
 Python opens the device and hands it to `tq_servo_run` (rig/force/servo.h), which keeps this thread
 until it is asked to stop. Where the parent is gone, the force ramps to 0 and the process ends
@@ -12,22 +12,22 @@ import threading
 from math import nan
 from typing import Any
 
-from modeling.errors import InputError
-from rig.force.dhd import DhdLibrary
-from rig.force.realtime import SERVO_PRIORITY, real_time
-from rig.force.serving import ServedServo, serve_servo
-from rig.force.settings import (
+from tactileq.modeling.errors import InputError
+from tactileq.rig.force.dhd import DhdLibrary
+from tactileq.rig.force.realtime import SERVO_PRIORITY, real_time
+from tactileq.rig.force.serving import ServedServo, serve_servo
+from tactileq.rig.force.settings import (
     JUMP_MM,
     MISSED_S,
     UNWATCHED_S,
     VELOCITY_HZ,
     ForceSettings,
 )
-from rig.hand.messages import Ready
-from rig.live.clock import now_s
-from rig.live.compiled import compiled
-from rig.live.driven import Parent
-from rig.live.memory import GONE, HEARTBEAT_S, SIMULATED, Live
+from tactileq.rig.hand.messages import Ready
+from tactileq.rig.live.clock import now_s
+from tactileq.rig.live.compiled import compiled
+from tactileq.rig.live.driven import Parent
+from tactileq.rig.live.memory import GONE, HEARTBEAT_S, SIMULATED, Live
 
 
 def main() -> None:

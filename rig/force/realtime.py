@@ -6,7 +6,7 @@ import os
 import signal
 import sys
 
-from rig.live.clock import is_given
+from tactileq.rig.live.clock import is_given
 
 SERVO_PRIORITY = 20
 WATCHDOG_PRIORITY = 30

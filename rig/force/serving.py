@@ -1,4 +1,4 @@
-"""How the process of a servo begins and ends: driven by `rig.force.messages`."""
+"""How the process of a servo begins and ends: driven by `tactileq.rig.force.messages`."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from abc import ABC, abstractmethod
 from contextlib import suppress
 from typing import Any
 
-from modeling.errors import InputError
-from rig.force.control import Control
-from rig.force.messages import RunServo
-from rig.force.realtime import outlive_signals
-from rig.force.settings import ForceSettings
-from rig.force.states import Ask
-from rig.hand.messages import HandFault
-from rig.live.clock import now_s, wait_for
-from rig.live.driven import Parent
-from rig.live.memory import Live
-from rig.live.messages import Done, Message
+from tactileq.modeling.errors import InputError
+from tactileq.rig.force.control import Control
+from tactileq.rig.force.messages import RunServo
+from tactileq.rig.force.realtime import outlive_signals
+from tactileq.rig.force.settings import ForceSettings
+from tactileq.rig.force.states import Ask
+from tactileq.rig.hand.messages import HandFault
+from tactileq.rig.live.clock import now_s, wait_for
+from tactileq.rig.live.driven import Parent
+from tactileq.rig.live.memory import Live
+from tactileq.rig.live.messages import Done, Message
 
 AGAIN_S = 0.5  # between attempts to open a device that is gone
 _BEAT_S = 0.02

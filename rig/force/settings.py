@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from modeling.errors import InputError
+from tactileq.modeling.errors import InputError
 
 MISSED_S = 0.02  # the watchdog acts after this time without a tick
 UNWATCHED_S = 0.1  # a servo lets go after this time without its watchdog

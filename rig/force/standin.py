@@ -11,11 +11,11 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from modeling.errors import InputError
-from rig.live.clock import sleep
+from tactileq.modeling.errors import InputError
+from tactileq.rig.live.clock import sleep
 
 try:
-    import rig.force._standin as _standin
+    import tactileq.rig.force._standin as _standin
 except ImportError:  # no compiler at installation
     _standin = None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf
 
-from modeling.checks import check_number
+from tactileq.modeling.checks import check_number
 
 STIFFEST_N_PER_MM = 20.0
 LARGEST_MM = 1000.0

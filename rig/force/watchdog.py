@@ -1,4 +1,4 @@
-"""The watchdog's process: `python -m rig.force.watchdog`, driven by `rig.force.messages`.
+"""The watchdog's process: `python -m tactileq.rig.force.watchdog`, driven by `tactileq.rig.force.messages`.
 
 A servo that was stopped cannot end its own force. Where one that may push has not ticked for 20 ms,
 it is killed, and the device opened and released in its place. Nothing is armed again
@@ -12,18 +12,18 @@ import signal
 import threading
 from contextlib import suppress
 
-from modeling.errors import InputError
-from rig.force.control import Control
-from rig.force.dhd import DhdLibrary
-from rig.force.messages import Acted, Servo, Watch
-from rig.force.realtime import WATCHDOG_PRIORITY, outlive_signals, real_time
-from rig.force.settings import MISSED_S, ForceSettings
-from rig.force.states import State
-from rig.hand.messages import Ready
-from rig.live.clock import now_s, sleep, taking_part
-from rig.live.driven import Parent
-from rig.live.memory import Live
-from rig.live.messages import Done
+from tactileq.modeling.errors import InputError
+from tactileq.rig.force.control import Control
+from tactileq.rig.force.dhd import DhdLibrary
+from tactileq.rig.force.messages import Acted, Servo, Watch
+from tactileq.rig.force.realtime import WATCHDOG_PRIORITY, outlive_signals, real_time
+from tactileq.rig.force.settings import MISSED_S, ForceSettings
+from tactileq.rig.force.states import State
+from tactileq.rig.hand.messages import Ready
+from tactileq.rig.live.clock import now_s, sleep, taking_part
+from tactileq.rig.live.driven import Parent
+from tactileq.rig.live.memory import Live
+from tactileq.rig.live.messages import Done
 
 LOOK_S = 0.05
 EVERY_S = 0.002

@@ -5,14 +5,14 @@ from __future__ import annotations
 from math import nan
 from typing import Any
 
-from rig.force.states import Ask, Cause, State
-from rig.live.clock import now_s
-from rig.live.compiled import compiled
-from rig.live.memory import FORCE_COMMANDED, GONE, SIMULATED, Live
+from tactileq.rig.force.states import Ask, Cause, State
+from tactileq.rig.live.clock import now_s
+from tactileq.rig.live.compiled import compiled
+from tactileq.rig.live.memory import FORCE_COMMANDED, GONE, SIMULATED, Live
 
 
 class ServoWords:
-    """What a servo reads and reports; `rig.force.control` is the other side.
+    """What a servo reads and reports; `tactileq.rig.force.control` is the other side.
 
     Parameters
     ----------

@@ -5,11 +5,11 @@ from __future__ import annotations
 import sys
 from contextlib import suppress
 
-from modeling.errors import InputError
-from modeling.extras import MissingExtra
-from rig.hand.sample import ConnectedDevice, Device
-from rig.hand.scripted import ScriptedHand
-from rig.hand.settings import HandSettings
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.extras import MissingExtra
+from tactileq.rig.hand.sample import ConnectedDevice, Device
+from tactileq.rig.hand.scripted import ScriptedHand
+from tactileq.rig.hand.settings import HandSettings
 
 
 def open_device(settings: HandSettings) -> Device:
@@ -23,11 +23,11 @@ def open_device(settings: HandSettings) -> Device:
     if settings.kind == "scripted":
         return ScriptedHand.open(settings)
     if settings.kind == "serial":
-        from rig.hand.serial_sensor import SerialSensor  # pyserial, which others do not need
+        from tactileq.rig.hand.serial_sensor import SerialSensor  # pyserial, which others do not need
 
         return SerialSensor.open(settings)
     if settings.kind in ("tablet", "mouse") and sys.platform == "linux":
-        from rig.hand.evdev import EventDevice  # which needs calls that only Linux has
+        from tactileq.rig.hand.evdev import EventDevice  # which needs calls that only Linux has
 
         return EventDevice.open(settings)
     if settings.kind == "force":
@@ -48,11 +48,11 @@ def connected_devices() -> tuple[ConnectedDevice, ...]:
     """
     ports: tuple[ConnectedDevice, ...] = ()
     with suppress(MissingExtra):
-        from rig.hand.serial_sensor import serial_ports
+        from tactileq.rig.hand.serial_sensor import serial_ports
 
         ports = serial_ports()
     if sys.platform != "linux":
         return ports
-    from rig.hand.evdev import input_devices
+    from tactileq.rig.hand.evdev import input_devices
 
     return input_devices() + ports

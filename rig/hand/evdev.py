@@ -13,8 +13,8 @@ import time
 from fcntl import ioctl
 from pathlib import Path
 
-from modeling.errors import InputError, shown
-from rig.hand.events import (
+from tactileq.modeling.errors import InputError, shown
+from tactileq.rig.hand.events import (
     ABS_PRESSURE,
     ABS_X,
     ABS_Y,
@@ -36,11 +36,11 @@ from rig.hand.events import (
     PenHand,
     State,
 )
-from rig.hand.pressure import PressureCurve
-from rig.hand.sample import ConnectedDevice, DeviceLost, Sample
-from rig.hand.settings import HandSettings
-from rig.hand.tracking import REST_S
-from rig.live.clock import now_s, readable
+from tactileq.rig.hand.pressure import PressureCurve
+from tactileq.rig.hand.sample import ConnectedDevice, DeviceLost, Sample
+from tactileq.rig.hand.settings import HandSettings
+from tactileq.rig.hand.tracking import REST_S
+from tactileq.rig.live.clock import now_s, readable
 
 SYSFS = Path("/sys/class/input")
 DEV = Path("/dev/input")

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from math import nan
 from typing import NamedTuple, Protocol
 
-from rig.hand.pressure import PressureCurve
-from rig.hand.sample import Sample
+from tactileq.rig.hand.pressure import PressureCurve
+from tactileq.rig.hand.sample import Sample
 
 # struct input_event: seconds and microseconds (two words of the machine), type, code, value.
 EVENT = struct.Struct("@LLHHi")

@@ -5,10 +5,10 @@ from __future__ import annotations
 from math import isfinite, nan
 from typing import NamedTuple
 
-from rig.hand.sample import DeviceLost, Sample
-from rig.hand.settings import HandSettings
-from rig.hand.tracking import TrackingFilter
-from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, SIMULATED, Live
+from tactileq.rig.hand.sample import DeviceLost, Sample
+from tactileq.rig.hand.settings import HandSettings
+from tactileq.rig.hand.tracking import TrackingFilter
+from tactileq.rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, SIMULATED, Live
 
 
 class Reading(NamedTuple):

@@ -7,14 +7,14 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 
-from rig.hand.devices import open_device
-from rig.hand.following import Follower, Reading
-from rig.hand.messages import Counts, Firmware, HandFault
-from rig.hand.sample import LOST_S, Device, DeviceLost
-from rig.hand.settings import HandSettings
-from rig.hand.tracking import REST_S
-from rig.live.clock import now_s, sleep
-from rig.live.memory import Live
+from tactileq.rig.hand.devices import open_device
+from tactileq.rig.hand.following import Follower, Reading
+from tactileq.rig.hand.messages import Counts, Firmware, HandFault
+from tactileq.rig.hand.sample import LOST_S, Device, DeviceLost
+from tactileq.rig.hand.settings import HandSettings
+from tactileq.rig.hand.tracking import REST_S
+from tactileq.rig.live.clock import now_s, sleep
+from tactileq.rig.live.memory import Live
 
 BEAT_S = 0.002  # readings are written so often at most, and at rest
 AGAIN_S = 0.5  # between attempts to open a device that is gone

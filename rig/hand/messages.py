@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rig.hand.settings import HandSettings
-from rig.live.messages import Done, Message
+from tactileq.rig.hand.settings import HandSettings
+from tactileq.rig.live.messages import Done, Message
 
 
 class ReadHand(Message, frozen=True, kw_only=True):

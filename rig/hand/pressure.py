@@ -9,9 +9,9 @@ from itertools import pairwise
 from math import isfinite, sqrt
 from statistics import fmean
 
-from modeling.checks import HIGHEST_FORCE_N, check_number, is_number
-from modeling.errors import InputError, shown
-from rig.hand.settings import Points, check_points
+from tactileq.modeling.checks import HIGHEST_FORCE_N, check_number, is_number
+from tactileq.modeling.errors import InputError, shown
+from tactileq.rig.hand.settings import Points, check_points
 
 FEWEST_WEIGHTS = 3
 

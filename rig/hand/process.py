@@ -1,6 +1,6 @@
 """The hand's process: reads the device, filters, writes readings.
 
-`rig.hand.messages` go between it and `rig.hand.reader`. Where its parent is gone, it ends
+`tactileq.rig.hand.messages` go between it and `tactileq.rig.hand.reader`. Where its parent is gone, it ends
 (docs/method/hand.md#process).
 """
 
@@ -10,13 +10,13 @@ import gc
 import threading
 from contextlib import suppress
 
-from modeling.errors import InputError
-from rig.hand.loop import HandLoop
-from rig.hand.messages import HandFault, ReadHand, Ready, Unplug
-from rig.live.clock import taking_part
-from rig.live.driven import Parent
-from rig.live.memory import Live
-from rig.live.messages import Done
+from tactileq.modeling.errors import InputError
+from tactileq.rig.hand.loop import HandLoop
+from tactileq.rig.hand.messages import HandFault, ReadHand, Ready, Unplug
+from tactileq.rig.live.clock import taking_part
+from tactileq.rig.live.driven import Parent
+from tactileq.rig.live.memory import Live
+from tactileq.rig.live.messages import Done
 
 
 def main() -> None:

@@ -7,16 +7,16 @@ from collections import deque
 from contextlib import suppress
 from typing import Any, Self
 
-from modeling.errors import InputError
-from rig.hand.following import Follower
-from rig.hand.messages import Counts, Firmware, HandFault, ReadHand, Ready, Report, Unplug
-from rig.hand.settings import HandSettings
-from rig.hand.tracking import REST_S
-from rig.hand.window import WindowHand
-from rig.live.child import Child, ChildLost
-from rig.live.clock import now_s, wait_for
-from rig.live.memory import Live
-from rig.live.messages import Done
+from tactileq.modeling.errors import InputError
+from tactileq.rig.hand.following import Follower
+from tactileq.rig.hand.messages import Counts, Firmware, HandFault, ReadHand, Ready, Report, Unplug
+from tactileq.rig.hand.settings import HandSettings
+from tactileq.rig.hand.tracking import REST_S
+from tactileq.rig.hand.window import WindowHand
+from tactileq.rig.live.child import Child, ChildLost
+from tactileq.rig.live.clock import now_s, wait_for
+from tactileq.rig.live.memory import Live
+from tactileq.rig.live.messages import Done
 
 START_S = 30.0
 FIRMWARE_S = 1.0  # a serial sensor states its firmware twice as often
@@ -158,7 +158,7 @@ class HandReader:
 
     def _start(self, *, patient: bool) -> Child:
         settings = ReadHand(live=str(self._live.path), settings=self._settings, patient=patient)
-        self._child = child = Child("rig.hand.process", settings)
+        self._child = child = Child("tactileq.rig.hand.process", settings)
         if self._closing.is_set():  # closed in between
             child.close()
         return child

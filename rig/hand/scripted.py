@@ -8,14 +8,14 @@ from typing import Protocol
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError, shown
-from modeling.files.columns import Column, names
-from modeling.files.tables import read_table
-from rig.hand.sample import Sample
-from rig.hand.settings import SCRIPTS, HandSettings
-from rig.hand.tracking import REST_S
-from rig.live.clock import now_s, sleep
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.files.columns import Column, names
+from tactileq.modeling.files.tables import read_table
+from tactileq.rig.hand.sample import Sample
+from tactileq.rig.hand.settings import SCRIPTS, HandSettings
+from tactileq.rig.hand.tracking import REST_S
+from tactileq.rig.live.clock import now_s, sleep
 
 RATE_HZ = 1000
 _LARGEST = 1e6  # of any number in a table

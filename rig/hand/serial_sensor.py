@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import time
 
-from modeling.errors import InputError
-from modeling.extras import extra
-from rig.hand.sample import LOST_S, ConnectedDevice, DeviceLost, Sample
-from rig.hand.serial_line import LineReader, SensorClock, SensorLine
-from rig.hand.settings import HandSettings
-from rig.live.clock import now_s, readable
-from rig.wire.ports import opened_port, port_names, ports_listed
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.extras import extra
+from tactileq.rig.hand.sample import LOST_S, ConnectedDevice, DeviceLost, Sample
+from tactileq.rig.hand.serial_line import LineReader, SensorClock, SensorLine
+from tactileq.rig.hand.settings import HandSettings
+from tactileq.rig.live.clock import now_s, readable
+from tactileq.rig.wire.ports import opened_port, port_names, ports_listed
 
 with extra("rig"):
     import serial

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import isfinite
 
-from modeling.checks import (
+from tactileq.modeling.checks import (
     check_choice,
     check_name,
     check_number,
     check_whole,
     is_number,
 )
-from modeling.errors import InputError, shown
+from tactileq.modeling.errors import InputError, shown
 
 KINDS = ("tablet", "mouse", "serial", "window", "scripted", "force")
 SCRIPTS = ("strokes", "hold")

@@ -9,11 +9,11 @@ from __future__ import annotations
 import threading
 from collections import deque
 
-from rig.hand.loop import HandLoop
-from rig.hand.sample import Sample
-from rig.hand.settings import HandSettings
-from rig.live.clock import now_s, wait_for
-from rig.live.memory import Live
+from tactileq.rig.hand.loop import HandLoop
+from tactileq.rig.hand.sample import Sample
+from tactileq.rig.hand.settings import HandSettings
+from tactileq.rig.live.clock import now_s, wait_for
+from tactileq.rig.live.memory import Live
 
 _MOST_PUSHED = 10_000
 

@@ -12,13 +12,13 @@ from typing import Literal
 
 import numpy as np
 
-from modeling import InputError
-from modeling.arrays import Floats
-from modeling.errors import counted, shortened, shown
-from modeling.files.columns import number_in
-from modeling.files.reading import read_bytes
-from modeling.files.tables import csv_cells
-from rig.importing.times import TimeColumn, since_first
+from tactileq.modeling import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import counted, shortened, shown
+from tactileq.modeling.files.columns import number_in
+from tactileq.modeling.files.reading import read_bytes
+from tactileq.modeling.files.tables import csv_cells
+from tactileq.rig.importing.times import TimeColumn, since_first
 
 Axis = Literal["x", "y", "z", "dft321"]
 ROLES = ("time", "x", "y", "z")

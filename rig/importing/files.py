@@ -9,15 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from modeling import InputError, Recording, RecordingSet
-from modeling.arrays import Floats
-from modeling.checks import check_number
-from modeling.errors import shortened, shown
-from modeling.files.wav import full_scale, read_wav
-from modeling.recordings.appending import WavSource
-from modeling.recordings.recording import clipped_samples
-from modeling.recordings.spectrum import dft321
-from rig.importing.csv_columns import (
+from tactileq.modeling import InputError, Recording, RecordingSet
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import check_number
+from tactileq.modeling.errors import shortened, shown
+from tactileq.modeling.files.wav import full_scale, read_wav
+from tactileq.modeling.recordings.appending import WavSource
+from tactileq.modeling.recordings.recording import clipped_samples
+from tactileq.modeling.recordings.spectrum import dft321
+from tactileq.rig.importing.csv_columns import (
     AXES,
     Axis,
     chosen_axes,
@@ -25,9 +25,9 @@ from rig.importing.csv_columns import (
     read_columns,
     time_column,
 )
-from rig.importing.labels import Label
-from rig.importing.plausible import G_PER_UNIT, doubts_about
-from rig.importing.times import TimeColumn
+from tactileq.rig.importing.labels import Label
+from tactileq.rig.importing.plausible import G_PER_UNIT, doubts_about
+from tactileq.rig.importing.times import TimeColumn
 
 # Below it layers are missed: docs/method/recordings.md#shortest-records
 SHORTEST_MODELLED_S = 0.2

@@ -14,19 +14,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.signal import freqz, lfilter, resample
 
-from modeling import InputError, Recording, RecordingSet
-from modeling.arrays import Floats, Integers
-from modeling.checks import (
+from tactileq.modeling import InputError, Recording, RecordingSet
+from tactileq.modeling.arrays import Floats, Integers
+from tactileq.modeling.checks import (
     HIGHEST_FORCE_N,
     HIGHEST_SPEED_MM_S,
     LOWEST_RATE_HZ,
     check_duration,
 )
-from modeling.errors import counted
-from modeling.models.line_spectral import prediction_coefficients
-from modeling.perception.thresholds import STANDARD_GRAVITY_M_S2
-from modeling.recordings.recording import MIN_SAMPLES
-from modeling.seeds import generator, number_of
+from tactileq.modeling.errors import counted
+from tactileq.modeling.models.line_spectral import prediction_coefficients
+from tactileq.modeling.perception.thresholds import STANDARD_GRAVITY_M_S2
+from tactileq.modeling.recordings.recording import MIN_SAMPLES
+from tactileq.modeling.seeds import generator, number_of
 
 AGREEMENT = 5e-5
 HATT_UNITS = {"AccelUnits": "m/s^2", "SpeedUnits": "mm/s", "ForceUnits": "N"}

@@ -11,9 +11,9 @@ from itertools import product
 
 import numpy as np
 
-from modeling import InputError
-from modeling.arrays import Floats
-from rig.importing.hatt import HattTexture
+from tactileq.modeling import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.rig.importing.hatt import HattTexture
 
 NODES_PER_AXIS = 7
 # Values whose range is a smaller share of the highest are one: nodes between them would all be

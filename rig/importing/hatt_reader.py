@@ -10,16 +10,16 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from modeling import InputError
-from modeling.arrays import Floats, Integers
-from modeling.checks import (
+from tactileq.modeling import InputError
+from tactileq.modeling.arrays import Floats, Integers
+from tactileq.modeling.checks import (
     HIGHEST_RATE_HZ,
     LOWEST_RATE_HZ,
 )
-from modeling.errors import counted, shortened, shown
-from modeling.files.reading import read_bytes
-from modeling.models.line_spectral import check_line_spectral, prediction_coefficients
-from rig.importing.hatt import (
+from tactileq.modeling.errors import counted, shortened, shown
+from tactileq.modeling.files.reading import read_bytes
+from tactileq.modeling.models.line_spectral import check_line_spectral, prediction_coefficients
+from tactileq.rig.importing.hatt import (
     _ONLY_LINES,
     _TINY,
     AGREEMENT,

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from modeling import InputError
-from modeling.files.columns import Column, chosen
-from modeling.files.tables import read_cells, typed
-from modeling.recordings.recording_set import KNOWN_COLUMNS
+from tactileq.modeling import InputError
+from tactileq.modeling.files.columns import Column, chosen
+from tactileq.modeling.files.tables import read_cells, typed
+from tactileq.modeling.recordings.recording_set import KNOWN_COLUMNS
 
 LABEL_COLUMNS = (
     *chosen(KNOWN_COLUMNS, "file", "speed_mm_s", "force_n"),

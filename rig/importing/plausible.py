@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modeling import Recording
-from modeling.perception.thresholds import STANDARD_GRAVITY_M_S2
+from tactileq.modeling import Recording
+from tactileq.modeling.perception.thresholds import STANDARD_GRAVITY_M_S2
 
 
 class Range(NamedTuple):

@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modeling import InputError
-from modeling.arrays import Floats
-from modeling.checks import HIGHEST_RATE_HZ, LARGEST_VALUE
-from modeling.errors import shown
-from modeling.recordings.spectrum import MODEL_RATE_HZ
+from tactileq.modeling import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import HIGHEST_RATE_HZ, LARGEST_VALUE
+from tactileq.modeling.errors import shown
+from tactileq.modeling.recordings.spectrum import MODEL_RATE_HZ
 
 SECONDS_PER_UNIT = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 LONGEST_GAP = 2.5

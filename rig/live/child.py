@@ -17,9 +17,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any, TypeVar
 
-from modeling.errors import InputError
-from rig.live.clock import next_of, wait_for
-from rig.live.messages import Message, Refused, decoded, received, send
+from tactileq.modeling.errors import InputError
+from tactileq.rig.live.clock import next_of, wait_for
+from tactileq.rig.live.messages import Message, Refused, decoded, received, send
 
 ANSWER_S = 5.0
 START_S = 15.0
@@ -60,7 +60,7 @@ def _last_line(complaints: IO[bytes]) -> str:
 
 
 class Child:
-    """A process with a `rig.live.driven.Parent` at its other end; it is started at once.
+    """A process with a `tactileq.rig.live.driven.Parent` at its other end; it is started at once.
 
     Parameters
     ----------

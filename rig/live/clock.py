@@ -17,8 +17,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Self, TypeVar
 
-from modeling.errors import InputError
-from rig.live.compiled import CLOCK, compiled, is_compiled
+from tactileq.modeling.errors import InputError
+from tactileq.rig.live.compiled import CLOCK, compiled, is_compiled
 
 SLICE_S = 1e-3
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from modeling.errors import InputError
+from tactileq.modeling.errors import InputError
 
 CLOCK = "TACTILEQ_CLOCK"  # the file of a clock that is given to this process (clock.h)
 
 try:
-    import rig.live._live as _live
+    import tactileq.rig.live._live as _live
 except ImportError:  # no compiler at installation
     _live = None
 else:

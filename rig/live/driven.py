@@ -1,4 +1,4 @@
-"""The other end of a `rig.live.child.Child`: a process that is driven by messages."""
+"""The other end of a `tactileq.rig.live.child.Child`: a process that is driven by messages."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import sys
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from modeling.errors import InputError
-from rig.live.messages import Message, Refused, decoded, received, send
+from tactileq.modeling.errors import InputError
+from tactileq.rig.live.messages import Message, Refused, decoded, received, send
 
 Settings = TypeVar("Settings")
 

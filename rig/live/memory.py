@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling.arrays import Floats
-from modeling.errors import InputError, shown
-from modeling.files.locks import WAIT_S, HeldError, Lock
-from rig.live.compiled import compiled
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.files.locks import WAIT_S, HeldError, Lock
+from tactileq.rig.live.compiled import compiled
 
 # Flags of a reading, and of a block.
 CONTACT, BUTTON, FORCE_ASSUMED, SIMULATED, GONE, FORCE_COMMANDED, BEYOND = 1, 2, 4, 8, 16, 32, 64

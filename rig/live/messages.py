@@ -11,7 +11,7 @@ from typing import IO, Any
 
 import msgspec
 
-from modeling.errors import InputError
+from tactileq.modeling.errors import InputError
 
 _LENGTH = 4  # bytes
 _LONGEST = 2**29  # less than any four letters, should something else write into the pipe

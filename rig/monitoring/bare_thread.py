@@ -1,4 +1,4 @@
-"""A thread that does nothing but wake up in time: `python -m rig.monitoring.bare_thread`.
+"""A thread that does nothing but wake up in time: `python -m tactileq.rig.monitoring.bare_thread`.
 
 Its misses are due to the machine; they are shown beside those of the audio callback.
 It is started with its period in seconds.
@@ -9,8 +9,8 @@ from __future__ import annotations
 import threading
 import time
 
-from rig.live.driven import Parent
-from rig.live.messages import Done, Message
+from tactileq.rig.live.driven import Parent
+from tactileq.rig.live.messages import Done, Message
 
 
 class WakeUps(Message, frozen=True):

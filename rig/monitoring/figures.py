@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from modeling.arrays import Floats
-from rig.live.memory import (
+from tactileq.modeling.arrays import Floats
+from tactileq.rig.live.memory import (
     BLOCK,
     FORCE_ASSUMED,
     GONE,

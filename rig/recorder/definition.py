@@ -4,6 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rig.wire.definition import Definition
+from tactileq.rig.wire.definition import Definition
 
 RECORDER = Definition.load(Path(__file__).with_name("recorder.yml"))

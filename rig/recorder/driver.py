@@ -6,23 +6,23 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Protocol
 
-from modeling.errors import InputError
-from rig.device.virtual import TICK_HZ, VirtualBoard, VirtualTransport
-from rig.live.clock import sleep
-from rig.recorder.definition import RECORDER
-from rig.recorder.law import RecorderLaw, WantedRecord
-from rig.recorder.registers import (
+from tactileq.modeling.errors import InputError
+from tactileq.rig.device.virtual import TICK_HZ, VirtualBoard, VirtualTransport
+from tactileq.rig.live.clock import sleep
+from tactileq.rig.recorder.definition import RECORDER
+from tactileq.rig.recorder.law import RecorderLaw, WantedRecord
+from tactileq.rig.recorder.registers import (
     RecorderCause,
     RecorderCommand,
     RecorderSimulation,
     RecorderState,
     RecorderStatus,
 )
-from rig.recorder.sensors import Sensor
-from rig.recorder.virtual import compiled_recorder
-from rig.wire.conversation import Conversation, DeviceRefused
-from rig.wire.definition import Value
-from rig.wire.link import Link
+from tactileq.rig.recorder.sensors import Sensor
+from tactileq.rig.recorder.virtual import compiled_recorder
+from tactileq.rig.wire.conversation import Conversation, DeviceRefused
+from tactileq.rig.wire.definition import Value
+from tactileq.rig.wire.link import Link
 
 LOOK_S = 0.05
 SLACK_S = 5.0  # beyond the patience of all phases

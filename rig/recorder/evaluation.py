@@ -8,9 +8,9 @@ from typing import Literal
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError, shortened, shown
-from modeling.files.reading import read_text
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError, shortened, shown
+from tactileq.modeling.files.reading import read_text
 
 Axis = Literal["x", "y", "z"]
 HEADER = "Time(s),ax(g),ay(g),az(g)"

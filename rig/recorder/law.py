@@ -8,10 +8,10 @@ from math import inf, pi, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
-from modeling.checks import check_number
-from modeling.errors import InputError
-from rig.wire.definition import Value
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import check_number
+from tactileq.modeling.errors import InputError
+from tactileq.rig.wire.definition import Value
 
 TICK_S = 1 / 5000
 FASTEST_SHARE = 0.93  # of the limit: what an encoder's counts add to the speed must not reach it

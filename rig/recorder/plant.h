@@ -25,7 +25,7 @@ typedef struct {
     double ohm, k_per_w, j_per_k;               /* of a winding: its resistance and heat */
 } tq_plant_parts;
 
-/* The same as rig.recorder.virtual.RecorderParts. */
+/* The same as tactileq.rig.recorder.virtual.RecorderParts. */
 static const tq_plant_parts tq_usual_parts = {
     7.28e-6, 2.75e-4, 1.6e-5, { 0.0273, 0.0273 }, { 2e-3, 3e-4 }, { 1e-6, 1e-6 }, 0, 0.3, 4, 2e-3,
     { 4096, 4096 }, 0.03, 0.04, 5000, 5, 1.5e-3, 2e-5, 0.3, 2e-3, 1, 10, 20

@@ -1,6 +1,6 @@
-"""An emulated recorder: `python -m rig.recorder.process process BAUD PORT`.
+"""An emulated recorder: `python -m tactileq.rig.recorder.process process BAUD PORT`.
 
-It prints where it is reached, as `rig.device.process` does.
+It prints where it is reached, as `tactileq.rig.device.process` does.
 """
 
 from __future__ import annotations
@@ -8,9 +8,9 @@ from __future__ import annotations
 import signal
 import sys
 
-from rig.device.process import new_entropy, run_board
-from rig.device.virtual import VirtualBoard
-from rig.recorder.virtual import compiled_recorder
+from tactileq.rig.device.process import new_entropy, run_board
+from tactileq.rig.device.virtual import VirtualBoard
+from tactileq.rig.recorder.virtual import compiled_recorder
 
 
 def main() -> None:

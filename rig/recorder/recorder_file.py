@@ -6,12 +6,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, Self
 
-from modeling.errors import InputError
-from modeling.files.described import BESIDE, DescribedFile, FileSection, key, naming
-from modeling.files.documents import read_toml
-from modeling.files.kinds import Name
-from rig.recorder.law import MotorLaw, RecorderLaw
-from rig.setup.figures import Figure
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.files.described import BESIDE, DescribedFile, FileSection, key, naming
+from tactileq.modeling.files.documents import read_toml
+from tactileq.modeling.files.kinds import Name
+from tactileq.rig.recorder.law import MotorLaw, RecorderLaw
+from tactileq.rig.setup.figures import Figure
 
 IN_VIRTUAL_TIME = "simulated"  # in place of an address
 SHIPPED_RECORDER_FILE = Path(__file__).with_name("recorder.toml")

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from modeling.errors import InputError
-from modeling.models.grid import Condition
-from rig.recorder.driver import Recorder, RecordRefused
-from rig.recorder.law import WantedRecord, check_conditions
-from rig.recorder.registers import RecorderCause
-from rig.recorder.sensors import CLOCK_S, CLOCK_SHARE, Sensor, SensorRefused
-from rig.recorder.store import Kept, RecorderStore
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.models.grid import Condition
+from tactileq.rig.recorder.driver import Recorder, RecordRefused
+from tactileq.rig.recorder.law import WantedRecord, check_conditions
+from tactileq.rig.recorder.registers import RecorderCause
+from tactileq.rig.recorder.sensors import CLOCK_S, CLOCK_SHARE, Sensor, SensorRefused
+from tactileq.rig.recorder.store import Kept, RecorderStore
 
 ATTEMPTS = 3
 LONGEST_S = 60.0  # that the recorder holds speed and force

@@ -12,11 +12,11 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from modeling.models.grid import Condition
-from rig.capture.input import AudioInput, InputBlock
-from rig.recorder.evaluation import Axis, read_evaluation
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.models.grid import Condition
+from tactileq.rig.capture.input import AudioInput, InputBlock
+from tactileq.rig.recorder.evaluation import Axis, read_evaluation
 
 SETTLED_S = 0.5  # a file that has not changed for so long may be whole
 MARGIN_S = 5.0  # that the recorder holds longer than a sound card should need

@@ -8,28 +8,28 @@ from math import inf
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-from modeling import Recording, RecordingSet
-from modeling.arrays import Floats
-from modeling.errors import InputError, shown
-from modeling.files.columns import Column, chosen
-from modeling.files.described import FileSection, key
-from modeling.files.documents import dump_json, read_json_object
-from modeling.files.folders import folder_behind
-from modeling.files.kinds import TextureName
-from modeling.files.provenance import PROVENANCE_NAME, provenance_text
-from modeling.files.tables import read_cells, table_text, typed
-from modeling.files.writing import write_text
-from modeling.models.grid import Condition
-from modeling.recordings.appending import append
-from modeling.recordings.recording_set import INDEX_COLUMNS, INDEX_NAME, listed, stated
-from rig.capture.pieces import Plan
-from rig.capture.recorded import (
+from tactileq.modeling import Recording, RecordingSet
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.files.columns import Column, chosen
+from tactileq.modeling.files.described import FileSection, key
+from tactileq.modeling.files.documents import dump_json, read_json_object
+from tactileq.modeling.files.folders import folder_behind
+from tactileq.modeling.files.kinds import TextureName
+from tactileq.modeling.files.provenance import PROVENANCE_NAME, provenance_text
+from tactileq.modeling.files.tables import read_cells, table_text, typed
+from tactileq.modeling.files.writing import write_text
+from tactileq.modeling.models.grid import Condition
+from tactileq.modeling.recordings.appending import append
+from tactileq.modeling.recordings.recording_set import INDEX_COLUMNS, INDEX_NAME, listed, stated
+from tactileq.rig.capture.pieces import Plan
+from tactileq.rig.capture.recorded import (
     begin_index,
     check_continues,
     recorded_conditions,
     unusable_recordings,
 )
-from rig.recorder.driver import DriverRecord
+from tactileq.rig.recorder.driver import DriverRecord
 
 PLAN_NAME = "recorder.json"
 TABLE_NAME = "recorder.tsv"

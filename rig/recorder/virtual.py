@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from rig.recorder.law import TICK_S, RecorderLaw, WantedRecord
-from rig.recorder.registers import RecorderCause, RecorderState
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.rig.recorder.law import TICK_S, RecorderLaw, WantedRecord
+from tactileq.rig.recorder.registers import RecorderCause, RecorderState
 
 try:
-    import rig.recorder._recorder as _recorder
+    import tactileq.rig.recorder._recorder as _recorder
 except ImportError:  # no compiler at installation
     _recorder = None
 

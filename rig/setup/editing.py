@@ -7,7 +7,7 @@ from typing import Any
 
 import tomlkit
 
-from modeling.files.described import plain
+from tactileq.modeling.files.described import plain
 
 
 def with_values(text: str, values: Mapping[str, object]) -> str:

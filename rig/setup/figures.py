@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, ClassVar
 
-from modeling.errors import counted
-from modeling.files.described import FileSection, key
+from tactileq.modeling.errors import counted
+from tactileq.modeling.files.described import FileSection, key
 
 Points = tuple[tuple[float, float], ...]
 Unit = Annotated[str, key("that of the quantity", advice="convert the value and write that unit")]

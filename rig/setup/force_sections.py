@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from math import isclose, sqrt
 from typing import Annotated, ClassVar
 
-from modeling import InputError
-from modeling.files.described import FileSection, key
-from modeling.files.kinds import Name
-from rig.setup.figures import Figure
+from tactileq.modeling import InputError
+from tactileq.modeling.files.described import FileSection, key
+from tactileq.modeling.files.kinds import Name
+from tactileq.rig.setup.figures import Figure
 
 STAND_IN = "stand-in"  # in place of a library's path
 Vector = tuple[float, float, float]

@@ -17,19 +17,19 @@ from math import isclose
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
-from modeling.errors import InputError
-from modeling.files.described import BESIDE, DescribedFile, keys_of, naming
-from modeling.files.documents import read_toml
-from modeling.files.hashes import sha256_of_values
-from modeling.files.reading import read_bytes, read_text
-from modeling.files.writing import write_text
-from modeling.rendering.limits import Limits
-from modeling.vibrators.exposure import ACTION_VALUE_M_S2
-from modeling.vibrators.vibrator import Vibrator
-from rig.setup.editing import with_values
-from rig.setup.figures import Curve, Figure
-from rig.setup.force_sections import DeviceSection, ForceSection, PoseSection
-from rig.setup.sections import (
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.files.described import BESIDE, DescribedFile, keys_of, naming
+from tactileq.modeling.files.documents import read_toml
+from tactileq.modeling.files.hashes import sha256_of_values
+from tactileq.modeling.files.reading import read_bytes, read_text
+from tactileq.modeling.files.writing import write_text
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.modeling.vibrators.exposure import ACTION_VALUE_M_S2
+from tactileq.modeling.vibrators.vibrator import Vibrator
+from tactileq.rig.setup.editing import with_values
+from tactileq.rig.setup.figures import Curve, Figure
+from tactileq.rig.setup.force_sections import DeviceSection, ForceSection, PoseSection
+from tactileq.rig.setup.sections import (
     AccelerometerSection,
     CalibrationSection,
     HandSection,
@@ -53,7 +53,7 @@ class RigFile(DescribedFile):
     Parameters
     ----------
     rig, sound, vibrator, limits, hand, force, device, pose, accelerometer, latency, calibration
-        Its sections (`rig.setup.sections`, `rig.setup.force_sections`). None where there is no
+        Its sections (`tactileq.rig.setup.sections`, `tactileq.rig.setup.force_sections`). None where there is no
         force device or accelerometer, and where pose, latency or calibration have not been
         measured yet.
     real_surface : RealSurfaceSection

@@ -6,10 +6,10 @@ import datetime
 from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal
 
-from modeling import InputError
-from modeling.files.described import FileSection, key
-from modeling.files.kinds import Name, Rate
-from rig.setup.figures import Curve, Figure
+from tactileq.modeling import InputError
+from tactileq.modeling.files.described import FileSection, key
+from tactileq.modeling.files.kinds import Name, Rate
+from tactileq.rig.setup.figures import Curve, Figure
 
 LOUDEST_MASKING = 0.5
 HandKind = Literal["tablet", "mouse", "serial", "window", "scripted", "force"]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from modeling.errors import InputError
-from rig.live.child import Child, ChildLost
-from rig.live.messages import Done
-from rig.simulated.process import Card
-from rig.simulated.vibrator import SimulatedTransducers
+from tactileq.modeling.errors import InputError
+from tactileq.rig.live.child import Child, ChildLost
+from tactileq.rig.live.messages import Done
+from tactileq.rig.simulated.process import Card
+from tactileq.rig.simulated.vibrator import SimulatedTransducers
 
 DEVICE = "simulated-vibrator"
 
@@ -36,7 +36,7 @@ class SimulatedCard:
         InputError
             Without a JACK server.
         """
-        self._child = Child("rig.simulated.process", Card(self.vibrator, self.name))
+        self._child = Child("tactileq.rig.simulated.process", Card(self.vibrator, self.name))
         try:
             self._child.ready(Done)
         except ChildLost as lost:

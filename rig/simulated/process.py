@@ -1,4 +1,4 @@
-"""The simulated vibrator as a client of JACK: `python -m rig.simulated.process`.
+"""The simulated vibrator as a client of JACK: `python -m tactileq.rig.simulated.process`.
 
 It says once that it runs, and ends with its parent. To PortAudio it is a device of its own: what is
 played on it comes back as its input, shaken and measured.
@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError, shown
-from rig.live.driven import Parent
-from rig.live.messages import Done, Message
-from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
-from rig.sound.devices import SoundDevice, portaudio, sound_devices
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError, shown
+from tactileq.rig.live.driven import Parent
+from tactileq.rig.live.messages import Done, Message
+from tactileq.rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
+from tactileq.rig.sound.devices import SoundDevice, portaudio, sound_devices
 
 CHANNELS = 2
 

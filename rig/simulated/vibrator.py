@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from modeling.arrays import Floats
-from modeling.checks import check_keys, check_number, check_rate, check_whole
-from modeling.equalizer.bands import band_response, rational_tan
-from modeling.files.documents import read_toml
-from modeling.seeds import generator
-from modeling.vibrators.vibrator import check_band, check_height
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import check_keys, check_number, check_rate, check_whole
+from tactileq.modeling.equalizer.bands import band_response, rational_tan
+from tactileq.modeling.files.documents import read_toml
+from tactileq.modeling.seeds import generator
+from tactileq.modeling.vibrators.vibrator import check_band, check_height
 
 LONGEST_DELAY_S = 1.0
 _RANGES = {
@@ -36,7 +36,7 @@ _RANGES = {
 class SimulatedTransducers:
     """What is known of a simulated vibrator and of the accelerometer that it shakes.
 
-    It answers a drive w by G_w·(w + (R − 1)·H_BP(w)), one layer as `modeling.vibrators.Vibrator`
+    It answers a drive w by G_w·(w + (R − 1)·H_BP(w)), one layer as `tactileq.modeling.vibrators.Vibrator`
     describes it.
 
     Parameters

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from modeling.errors import InputError, shown
-from modeling.extras import extra
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.extras import extra
 
 Direction = Literal["input", "output"]
 USUAL_RATES_HZ = (8000, 16000, 22050, 32000, 44100, 48000, 88200, 96000, 176400, 192000)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from modeling.rendering.plan import RenderCounters
-from rig.live.messages import Message
+from tactileq.modeling.rendering.plan import RenderCounters
+from tactileq.rig.live.messages import Message
 
 # Members of a structure in C by name; arrays as bytes of float64.
 Members = dict[str, int | float | bytes]

@@ -10,21 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from modeling.models.ar_model import ARModel
-from modeling.models.loading import AnyModel
-from modeling.rendering.lattice import lattice_fields
-from modeling.rendering.limits import Limits
-from modeling.rendering.noise import stream_key
-from modeling.rendering.plan import usual_update_s
-from modeling.vibrators.compensation import Compensation
-from modeling.vibrators.exposure import hand_arm_sections
-from modeling.vibrators.vibrator import Vibrator
-from rig.live.child import ChildLost
-from rig.live.memory import Live, Rows
-from rig.live.messages import Done
-from rig.sound.messages import (
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.models.ar_model import ARModel
+from tactileq.modeling.models.loading import AnyModel
+from tactileq.modeling.rendering.lattice import lattice_fields
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.modeling.rendering.noise import stream_key
+from tactileq.modeling.rendering.plan import usual_update_s
+from tactileq.modeling.vibrators.compensation import Compensation
+from tactileq.modeling.vibrators.exposure import hand_arm_sections
+from tactileq.modeling.vibrators.vibrator import Vibrator
+from tactileq.rig.live.child import ChildLost
+from tactileq.rig.live.memory import Live, Rows
+from tactileq.rig.live.messages import Done
+from tactileq.rig.sound.messages import (
     Corrected,
     Count,
     Members,
@@ -33,8 +33,8 @@ from rig.sound.messages import (
     Silence,
     SoundSettings,
 )
-from rig.sound.supervision import HALTED, SoundLost, SoundProcess
-from rig.sound.vibration import Counted, Presented, VibrationOutput
+from tactileq.rig.sound.supervision import HALTED, SoundLost, SoundProcess
+from tactileq.rig.sound.vibration import Counted, Presented, VibrationOutput
 
 LOUDEST_MASKING = 0.5
 _MASKING_STREAM = 2**63

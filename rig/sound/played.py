@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling.rendering.limits import Limits
-from rig.live.clock import now_s
-from rig.live.memory import NO_HEARTBEAT, UNDERFLOW, Live, Rows
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.rig.live.clock import now_s
+from tactileq.rig.live.memory import NO_HEARTBEAT, UNDERFLOW, Live, Rows
 
 STALLED_S = 0.5  # without a block: the server is gone
 

@@ -1,4 +1,4 @@
-"""The process that plays: `python -m rig.sound.process`, driven by `rig.sound.messages`.
+"""The process that plays: `python -m tactileq.rig.sound.process`, driven by `tactileq.rig.sound.messages`.
 
 A process of its own, so that nothing that the experiment does delays it and it can be killed when a
 sound server hangs. PortAudio calls `tq_sound_callback` (`rig/live/sound.h`); Python here only
@@ -16,16 +16,16 @@ from typing import Any
 
 import numpy as np
 
-from modeling.errors import InputError
-from modeling.rendering.compiled import filled, memory_reals, render_counters
-from modeling.rendering.plan import RenderCounters
-from rig.live.clock import is_given, now_s
-from rig.live.compiled import compiled
-from rig.live.driven import Parent
-from rig.live.memory import HEARTBEAT_S, OLDEST_READING_S, Live
-from rig.live.messages import Done, Message
-from rig.sound.devices import check_rate, find_device, portaudio
-from rig.sound.messages import (
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.rendering.compiled import filled, memory_reals, render_counters
+from tactileq.modeling.rendering.plan import RenderCounters
+from tactileq.rig.live.clock import is_given, now_s
+from tactileq.rig.live.compiled import compiled
+from tactileq.rig.live.driven import Parent
+from tactileq.rig.live.memory import HEARTBEAT_S, OLDEST_READING_S, Live
+from tactileq.rig.live.messages import Done, Message
+from tactileq.rig.sound.devices import check_rate, find_device, portaudio
+from tactileq.rig.sound.messages import (
     Corrected,
     Count,
     Mask,

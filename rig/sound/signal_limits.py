@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.errors import InputError
-from modeling.rendering.plan import RenderPlan
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.rendering.plan import RenderPlan
 
 
 def check_signal(samples: Floats, plan: RenderPlan) -> None:

@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from modeling.errors import InputError, shown
-from modeling.files.columns import chosen
-from modeling.files.reading import read_bytes
-from modeling.files.stimulus_table import MANIFEST, STIMULUS_COLUMNS
-from modeling.files.tables import read_cells, typed
-from modeling.files.wav import read_wav
-from modeling.models.loading import load_model, made_from
-from rig.interface import PreparedSignal, Stimulus
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.files.columns import chosen
+from tactileq.modeling.files.reading import read_bytes
+from tactileq.modeling.files.stimulus_table import MANIFEST, STIMULUS_COLUMNS
+from tactileq.modeling.files.tables import read_cells, typed
+from tactileq.modeling.files.wav import read_wav
+from tactileq.modeling.models.loading import load_model, made_from
+from tactileq.rig.interface import PreparedSignal, Stimulus
 
 RAMP_S = 0.02
 _SIGNAL = chosen(

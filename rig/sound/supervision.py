@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from modeling.errors import InputError
-from rig.live.child import Child, ChildLost, Reply
-from rig.live.clock import now_s, sleep
-from rig.live.memory import HEARTBEAT_S, Rows
-from rig.live.messages import Done, Message
-from rig.sound.messages import Mask, Playing, SoundSettings
-from rig.sound.played import STALLED_S, PlayedBlocks
+from tactileq.modeling.errors import InputError
+from tactileq.rig.live.child import Child, ChildLost, Reply
+from tactileq.rig.live.clock import now_s, sleep
+from tactileq.rig.live.memory import HEARTBEAT_S, Rows
+from tactileq.rig.live.messages import Done, Message
+from tactileq.rig.sound.messages import Mask, Playing, SoundSettings
+from tactileq.rig.sound.played import STALLED_S, PlayedBlocks
 
 _POLL_S = 0.001
 HALTED = (
@@ -73,7 +73,7 @@ class SoundProcess:
         """The process that plays; InputError or SoundLost where there can be none."""
         if self._child is not None:
             return self._child
-        child = Child("rig.sound.process", self._settings)
+        child = Child("tactileq.rig.sound.process", self._settings)
         try:
             self._latency_s = child.ready(Playing).latency_s
             self._child = child

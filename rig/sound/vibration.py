@@ -12,15 +12,15 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
-from modeling.models.loading import AnyModel
-from modeling.rendering.limits import Limits
-from modeling.rendering.plan import RenderCounters, RenderPlan, plan_for
-from modeling.vibrators.compensation import Compensation
-from rig.live.clock import now_s, sleep
-from rig.live.memory import OLDEST_READING_S, Live, Rows
-from rig.sound.played import STALLED_S, PlayedBlocks
-from rig.sound.signal_limits import check_signal, largest_factor
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.models.loading import AnyModel
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.modeling.rendering.plan import RenderCounters, RenderPlan, plan_for
+from tactileq.modeling.vibrators.compensation import Compensation
+from tactileq.rig.live.clock import now_s, sleep
+from tactileq.rig.live.memory import OLDEST_READING_S, Live, Rows
+from tactileq.rig.sound.played import STALLED_S, PlayedBlocks
+from tactileq.rig.sound.signal_limits import check_signal, largest_factor
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,7 +1,7 @@
 """One host talking to one device: hello, reading and writing registers, uploads, records.
 
 It waits for each reply before it sends more, repeats a frame that was not answered (which the
-device then does once), and knows no thread; `rig.wire.link` has one.
+device then does once), and knows no thread; `tactileq.rig.wire.link` has one.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from modeling.errors import InputError
-from rig.wire.definition import Definition, Register, Value
-from rig.wire.envelope import REPLY, Kind, WireFrame, WireReader
-from rig.wire.transports import Transport, TransportLost
+from tactileq.modeling.errors import InputError
+from tactileq.rig.wire.definition import Definition, Register, Value
+from tactileq.rig.wire.envelope import REPLY, Kind, WireFrame, WireReader
+from tactileq.rig.wire.transports import Transport, TransportLost
 
 DEADLINE_S = 0.3
 AGAIN_S = 0.06  # without an answer a frame is sent again
@@ -190,7 +190,7 @@ class Conversation:
         ----------
         data : bytes
         digest : int
-            Its hash, which the device compares (`rig.device.models`).
+            Its hash, which the device compares (`tactileq.rig.device.models`).
 
         Raises
         ------

@@ -16,9 +16,9 @@ from typing import Any, Literal
 
 import msgspec
 
-from modeling.errors import InputError, shown
-from modeling.extras import extra
-from modeling.files.reading import read_text
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.extras import extra
+from tactileq.modeling.files.reading import read_text
 
 with extra("rig"):
     import yaml

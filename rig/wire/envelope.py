@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 
-from modeling.errors import InputError
-from modeling.extras import extra
-from rig.wire.definition import MOST_BODY
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.extras import extra
+from tactileq.rig.wire.definition import MOST_BODY
 
 with extra("rig"):
     from cobs import cobs

@@ -6,8 +6,8 @@ import json
 import re
 from collections.abc import Iterator
 
-from rig.wire.definition import Definition, Register, RegisterMask
-from rig.wire.envelope import REPLY, Kind, WireFrame
+from tactileq.rig.wire.definition import Definition, Register, RegisterMask
+from tactileq.rig.wire.envelope import REPLY, Kind, WireFrame
 
 _MADE = "Made from device.yml by `make docs-tables`; do not edit."
 _LICENCE = "Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later"

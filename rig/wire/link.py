@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Self
 
-from modeling.errors import InputError
-from rig.live.clock import taking_part, wait_for
-from rig.wire.conversation import Block, Conversation, Hello, upload_bodies
-from rig.wire.definition import Definition, Value
-from rig.wire.transports import Transport, TransportLost
+from tactileq.modeling.errors import InputError
+from tactileq.rig.live.clock import taking_part, wait_for
+from tactileq.rig.wire.conversation import Block, Conversation, Hello, upload_bodies
+from tactileq.rig.wire.definition import Definition, Value
+from tactileq.rig.wire.transports import Transport, TransportLost
 
 KEEP_S = 0.025  # a device that is not spoken to for 0.1 s lets go
 BEAT_S = 0.1  # a heartbeat of the control loop is passed on so often at most

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 
-from modeling.errors import InputError, shown
-from modeling.extras import extra
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.extras import extra
 
 with extra("rig"):
     import serial

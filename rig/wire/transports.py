@@ -7,10 +7,10 @@ import socket
 from contextlib import suppress
 from typing import Protocol
 
-from modeling.errors import InputError, shown
-from modeling.extras import extra
-from rig.live.clock import now_s, readable, sleep
-from rig.wire.ports import WRITE_S, opened_port
+from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.extras import extra
+from tactileq.rig.live.clock import now_s, readable, sleep
+from tactileq.rig.wire.ports import WRITE_S, opened_port
 
 with extra("rig"):
     import serial

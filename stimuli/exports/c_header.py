@@ -7,14 +7,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from modeling import Compensation, Limits
-from modeling.checks import check_name
-from modeling.errors import counted
-from modeling.files.writing import write_text
-from modeling.models.loading import AnyModel
-from modeling.rendering.noise import stream_key
-from modeling.rendering.plan import RenderPlan, plan_for, usual_update_s
-from stimuli.exports.c_source import (
+from tactileq.modeling import Compensation, Limits
+from tactileq.modeling.checks import check_name
+from tactileq.modeling.errors import counted
+from tactileq.modeling.files.writing import write_text
+from tactileq.modeling.models.loading import AnyModel
+from tactileq.modeling.rendering.noise import stream_key
+from tactileq.modeling.rendering.plan import RenderPlan, plan_for, usual_update_s
+from tactileq.stimuli.exports.c_source import (
     SINGLE_PRECISION,
     array,
     arrays_of,
@@ -27,7 +27,7 @@ from stimuli.exports.c_source import (
     restraints,
     source,
 )
-from stimuli.exports.layered import Layered, check_layered
+from tactileq.stimuli.exports.layered import Layered, check_layered
 
 NUMBERS = """\
 The numbers of the texture are data of those whose model it is; that licence does not

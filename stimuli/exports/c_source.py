@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling import InputError
-from modeling.rendering.plan import RenderPlan
-from stimuli.exports.layered import Layered
-from stimuli.sets.recipe import HIGHEST_FILE_RATE_HZ
+from tactileq.modeling import InputError
+from tactileq.modeling.rendering.plan import RenderPlan
+from tactileq.stimuli.exports.layered import Layered
+from tactileq.stimuli.sets.recipe import HIGHEST_FILE_RATE_HZ
 
 # Noise is within ±√3, and a band-pass adds up a few of its samples.
 HEADROOM = 100.0
@@ -25,8 +25,8 @@ SINGLE_PRECISION = "#ifndef TQ_REAL\n#define TQ_REAL float\n#endif\n\n"
 
 
 def source(header: str) -> str:
-    """The text of one of the headers of `modeling.rendering`."""
-    return files("modeling.rendering").joinpath(header).read_text(encoding="utf-8")
+    """The text of one of the headers of `tactileq.modeling.rendering`."""
+    return files("tactileq.modeling.rendering").joinpath(header).read_text(encoding="utf-8")
 
 
 def licence(data: str) -> str:

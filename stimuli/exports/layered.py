@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from modeling import ARModel, InputError
-from modeling.models.loading import AnyModel
-from modeling.models.loading import Layered as Layered
+from tactileq.modeling import ARModel, InputError
+from tactileq.modeling.models.loading import AnyModel
+from tactileq.modeling.models.loading import Layered as Layered
 
 
 def check_layered(model: AnyModel) -> Layered:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from modeling import InputError
-from modeling.equalizer.peq import PEQ
-from modeling.files.documents import dump_json
-from modeling.files.writing import write_text
-from modeling.models.loading import AnyModel
-from stimuli.exports.layered import Layered, check_layered
+from tactileq.modeling import InputError
+from tactileq.modeling.equalizer.peq import PEQ
+from tactileq.modeling.files.documents import dump_json
+from tactileq.modeling.files.writing import write_text
+from tactileq.modeling.models.loading import AnyModel
+from tactileq.stimuli.exports.layered import Layered, check_layered
 
 JSON_FORMAT = "tactileq.peq"
 JSON_VERSION = 1

@@ -10,11 +10,11 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from modeling import InputError
-from modeling.errors import counted
-from modeling.rendering.noise import seed_mix
-from modeling.rendering.plan import RenderPlan
-from stimuli.exports.c_source import (
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import counted
+from tactileq.modeling.rendering.noise import seed_mix
+from tactileq.modeling.rendering.plan import RenderPlan
+from tactileq.stimuli.exports.c_source import (
     SINGLE_PRECISION,
     array,
     arrays_of,
@@ -28,7 +28,7 @@ from stimuli.exports.c_source import (
     restraints,
     source,
 )
-from stimuli.exports.layered import Layered
+from tactileq.stimuli.exports.layered import Layered
 
 Rendered = Sequence[tuple[Layered, RenderPlan]]
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from modeling import InputError
-from modeling.files.writing import write_bytes
-from stimuli.sets.manifest import StimulusRow
-from stimuli.sets.recipe import Recipe
-from stimuli.sets.sources import Sources, load_sources
-from stimuli.sets.writing import check_clipping, rendered, stimulus_count
+from tactileq.modeling import InputError
+from tactileq.modeling.files.writing import write_bytes
+from tactileq.stimuli.sets.manifest import StimulusRow
+from tactileq.stimuli.sets.recipe import Recipe
+from tactileq.stimuli.sets.sources import Sources, load_sources
+from tactileq.stimuli.sets.writing import check_clipping, rendered, stimulus_count
 
 
 def write_wav(path: str | Path, recipe: Recipe, *, sources: Sources | None = None) -> StimulusRow:

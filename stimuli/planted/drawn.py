@@ -16,9 +16,9 @@ from importlib import resources
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling import InputError, Recording, RecordingSet
-from modeling.arrays import Floats
-from modeling.seeds import generator
+from tactileq.modeling import InputError, Recording, RecordingSet
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.seeds import generator
 
 RATE_HZ = 1000.0
 SPEEDS_MM_S = np.linspace(50.0, 350.0, 7)
@@ -201,7 +201,7 @@ def _statistics() -> _Statistics:
 
 def _table(name: str) -> Floats:
     """The numbers of one table; NaN for the names in its first column."""
-    file = resources.files("stimuli.planted").joinpath("spectral_statistics", f"{name}.tsv")
+    file = resources.files("tactileq.stimuli.planted").joinpath("spectral_statistics", f"{name}.tsv")
     with file.open(encoding="utf-8") as lines:
         return np.genfromtxt(lines, delimiter="\t", skip_header=1)
 

@@ -14,9 +14,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling import PEQ
-from modeling.arrays import Floats
-from modeling.equalizer.bands import band_response
+from tactileq.modeling import PEQ
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.bands import band_response
 
 TruthKind = Literal["coherent", "independent", "Gaussian"]
 KINDS: tuple[TruthKind, ...] = ("coherent", "independent", "Gaussian")

@@ -14,14 +14,14 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling import PEQ, InputError, Recording, RecordingSet, TextureModel, render_many
-from modeling.arrays import Floats
-from modeling.checks import check_duration
-from modeling.equalizer.bands import band_rms
-from modeling.errors import shown
-from modeling.models.grid import Condition
-from modeling.recordings.spectrum import MODEL_RATE_HZ
-from modeling.seeds import noise_seed
+from tactileq.modeling import PEQ, InputError, Recording, RecordingSet, TextureModel, render_many
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import check_duration
+from tactileq.modeling.equalizer.bands import band_rms
+from tactileq.modeling.errors import shown
+from tactileq.modeling.models.grid import Condition
+from tactileq.modeling.recordings.spectrum import MODEL_RATE_HZ
+from tactileq.modeling.seeds import noise_seed
 
 SPEEDS_MM_S = np.linspace(50.0, 350.0, 7)
 FORCES_N = np.linspace(0.5, 3.5, 7)

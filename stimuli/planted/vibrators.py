@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.signal import bilinear, freqz, lfilter
 
-from modeling.arrays import Floats
-from modeling.checks import check_rate
-from modeling.equalizer.bands import HIGHEST_FREQUENCY_SHARE, LOWEST_FREQUENCY_HZ
-from modeling.errors import InputError
-from modeling.vibrators.vibrator import Vibrator
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.checks import check_rate
+from tactileq.modeling.equalizer.bands import HIGHEST_FREQUENCY_SHARE, LOWEST_FREQUENCY_HZ
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.vibrators.vibrator import Vibrator
 
 
 @dataclass(frozen=True)

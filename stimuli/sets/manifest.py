@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.files.stimulus_table import MANIFEST, STIMULUS_COLUMNS
-from modeling.files.tables import write_table
-from modeling.files.writing import write_text
-from stimuli.sets.rendering import steady_part
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.files.stimulus_table import MANIFEST, STIMULUS_COLUMNS
+from tactileq.modeling.files.tables import write_table
+from tactileq.modeling.files.writing import write_text
+from tactileq.stimuli.sets.rendering import steady_part
 
 COLUMNS_FILE = "manifest.json"
 COMPENSATED = "compensated"

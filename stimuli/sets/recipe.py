@@ -13,14 +13,14 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import tomlkit
 
-from modeling import InputError
-from modeling.checks import HIGHEST_FORCE_N, HIGHEST_SPEED_MM_S
-from modeling.errors import shown
-from modeling.files.described import DescribedFile, FileSection, key, keys_of, plain
-from modeling.files.kinds import Name
-from modeling.files.values import NameOrFile
-from modeling.recordings.trajectory import LONGEST_S
-from modeling.scenes.loading import scene_name
+from tactileq.modeling import InputError
+from tactileq.modeling.checks import HIGHEST_FORCE_N, HIGHEST_SPEED_MM_S
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.described import DescribedFile, FileSection, key, keys_of, plain
+from tactileq.modeling.files.kinds import Name
+from tactileq.modeling.files.values import NameOrFile
+from tactileq.modeling.recordings.trajectory import LONGEST_S
+from tactileq.modeling.scenes.loading import scene_name
 
 SampleFormat = Literal["float32", "pcm24"]
 Noise = Literal["independent", "frozen"]

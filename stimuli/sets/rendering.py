@@ -9,11 +9,11 @@ from math import ceil
 import numpy as np
 from scipy.io import wavfile
 
-from modeling import Compensation, Renderer
-from modeling.arrays import Floats
-from modeling.models.loading import AnyModel
-from modeling.recordings.trajectory import Trajectory
-from stimuli.sets.recipe import SampleFormat
+from tactileq.modeling import Compensation, Renderer
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.models.loading import AnyModel
+from tactileq.modeling.recordings.trajectory import Trajectory
+from tactileq.stimuli.sets.recipe import SampleFormat
 
 FADE_S = 0.01
 # Rendered beyond both ends and faded to 0 there, so that the resampling's circle has no seam.

@@ -12,14 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
-from modeling import InputError, Scene, Threshold, Vibrator, compensation_for
-from modeling.errors import shown
-from modeling.files.values import NameOrFile
-from modeling.files.writing import file_stem, write_text
-from modeling.models.loading import AnyModel, load_model, models_in
-from modeling.recordings.trajectory import Trajectory, load_trajectory
-from modeling.scenes.loading import scene_models
-from stimuli.sets.recipe import ModelEntry, Recipe, SetLevel, TrajectoryEntry
+from tactileq.modeling import InputError, Scene, Threshold, Vibrator, compensation_for
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.values import NameOrFile
+from tactileq.modeling.files.writing import file_stem, write_text
+from tactileq.modeling.models.loading import AnyModel, load_model, models_in
+from tactileq.modeling.recordings.trajectory import Trajectory, load_trajectory
+from tactileq.modeling.scenes.loading import scene_models
+from tactileq.stimuli.sets.recipe import ModelEntry, Recipe, SetLevel, TrajectoryEntry
 
 FOLDER = "sources"
 RECIPE = "recipe.toml"

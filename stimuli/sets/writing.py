@@ -13,17 +13,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from modeling import InputError, Threshold, compensation_for
-from modeling.arrays import Floats
-from modeling.files.folders import Contents, check_replaceable, replace_folder
-from modeling.files.reading import reason_of
-from modeling.files.stimulus_table import MANIFEST
-from modeling.files.writing import file_stem
-from modeling.perception.sensation_level import SensationLevel, sensation_level
-from modeling.recordings.trajectory import Trajectory
-from modeling.seeds import noise_stream
-from modeling.threads import in_order, usable_cores
-from stimuli.sets.manifest import (
+from tactileq.modeling import InputError, Threshold, compensation_for
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.files.folders import Contents, check_replaceable, replace_folder
+from tactileq.modeling.files.reading import reason_of
+from tactileq.modeling.files.stimulus_table import MANIFEST
+from tactileq.modeling.files.writing import file_stem
+from tactileq.modeling.perception.sensation_level import SensationLevel, sensation_level
+from tactileq.modeling.recordings.trajectory import Trajectory
+from tactileq.modeling.seeds import noise_stream
+from tactileq.modeling.threads import in_order, usable_cores
+from tactileq.stimuli.sets.manifest import (
     COLUMNS_FILE,
     COMPENSATED,
     StimulusRow,
@@ -31,8 +31,8 @@ from stimuli.sets.manifest import (
     measured,
     write_manifest,
 )
-from stimuli.sets.recipe import Recipe, SampleFormat, TrajectoryEntry
-from stimuli.sets.rendering import (
+from tactileq.stimuli.sets.recipe import Recipe, SampleFormat, TrajectoryEntry
+from tactileq.stimuli.sets.rendering import (
     BITS,
     at_rate,
     highest_peak,
@@ -42,7 +42,7 @@ from stimuli.sets.rendering import (
     steady_part,
     wav_bytes,
 )
-from stimuli.sets.sources import (
+from tactileq.stimuli.sets.sources import (
     FOLDER,
     RECIPE,
     LabelledModel,

@@ -19,10 +19,10 @@ from tactileq.workers import working
 if TYPE_CHECKING:
     import pandas as pd
 
-    from analysis.answers.plan import AnalysisPlan
-    from analysis.answers.responses import Responses
-    from analysis.textures.results import TextureResult
-    from modeling import Simplification, TextureModel
+    from tactileq.analysis.answers.plan import AnalysisPlan
+    from tactileq.analysis.answers.responses import Responses
+    from tactileq.analysis.textures.results import TextureResult
+    from tactileq.modeling import Simplification, TextureModel
 
 
 def analyze(
@@ -118,14 +118,14 @@ def analyze(
         raise ValueError(
             "expected a folder of answers, or --table with files, got neither; give one of the two."
         )
-    from analysis.report.report import write_report
-    from analysis.statistics.described_verdicts import check_complete
-    from benches.validation.section import validation_section
-    from modeling.files.folders import replace_folder
-    from modeling.files.hashes import sha256_of_paths
-    from modeling.files.provenance import provenance_of, seal_folder
-    from modeling.models.loading import load_models
-    from modeling.perception.verdicts import load_simplifications
+    from tactileq.analysis.report.report import write_report
+    from tactileq.analysis.statistics.described_verdicts import check_complete
+    from tactileq.benches.validation.section import validation_section
+    from tactileq.modeling.files.folders import replace_folder
+    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.modeling.files.provenance import provenance_of, seal_folder
+    from tactileq.modeling.models.loading import load_models
+    from tactileq.modeling.perception.verdicts import load_simplifications
 
     seen = check_own_results(out, "analyze")
     places = _places(data)
@@ -186,12 +186,12 @@ def analyze_tables(files: Sequence[Path], columns: str, *, out: Path, seed: int)
     """Write the report on tables of any experiment."""
     import numpy as np
 
-    from analysis.answers.imported import load_imported, parse_map
-    from analysis.chapters.tables.section import table_sections
-    from analysis.report.report import write_report
-    from modeling.files.folders import replace_folder
-    from modeling.files.hashes import sha256_of_paths
-    from modeling.files.provenance import provenance_of, seal_folder
+    from tactileq.analysis.answers.imported import load_imported, parse_map
+    from tactileq.analysis.chapters.tables.section import table_sections
+    from tactileq.analysis.report.report import write_report
+    from tactileq.modeling.files.folders import replace_folder
+    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.modeling.files.provenance import provenance_of, seal_folder
 
     folders = [path for path in files if path.is_dir()]
     if not files or folders:
@@ -240,9 +240,9 @@ def read_answers(
         If something of those who are not left out differs from what sessions stored, and there is
         no reason to go on unverified; or the answers cannot be used.
     """
-    from analysis.answers.loading import load_responses
-    from analysis.answers.responses import SETUP_SEPARATOR, leave_out
-    from analysis.answers.setups import pool_setups
+    from tactileq.analysis.answers.loading import load_responses
+    from tactileq.analysis.answers.responses import SETUP_SEPARATOR, leave_out
+    from tactileq.analysis.answers.setups import pool_setups
     from tactileq.verification import require_verified
 
     reasons = dict(map(_with_reason, exclude))
@@ -264,8 +264,8 @@ def _hand(places: Mapping[str, Path], responses: Responses) -> pd.DataFrame:
     """How the hand moved at all set-ups, participants named as in the answers."""
     import pandas as pd
 
-    from analysis.answers.hand import load_hand
-    from analysis.answers.setups import answers_at, named_after
+    from tactileq.analysis.answers.hand import load_hand
+    from tactileq.analysis.answers.setups import answers_at, named_after
 
     tables = [
         named_after(name, load_hand(place, answers_at(name, responses.answers)))
@@ -281,8 +281,8 @@ def _with_reason(text: str) -> tuple[str, str]:
 
 def _later_plan(path: Path, registered: AnalysisPlan) -> AnalysisPlan:
     """The plan of a study file; claims not registered with its rule of verdicts are exploratory."""
-    from analysis.answers.plan import plan_from
-    from experiments.study.study import Study
+    from tactileq.analysis.answers.plan import plan_from
+    from tactileq.experiments.study.study import Study
 
     later = plan_from(Study.load(path).to_dict()["plan"], path=path, sha256=registered.sha256)
     same_rule = (later.rule, later.few) == (registered.rule, registered.few)
@@ -309,13 +309,13 @@ def validated(
     dask : str, optional
         Address of a scheduler.
     """
-    from benches.validation.model import (
+    from tactileq.benches.validation.model import (
         model_cells,
         model_table,
         simulate_model_cell,
     )
-    from benches.validation.procedures import cells, simulate_cell, validation_table
-    from benches.validation.ranks import RANK_KINDS, rank_table, simulate_ranks
+    from tactileq.benches.validation.procedures import cells, simulate_cell, validation_table
+    from tactileq.benches.validation.ranks import RANK_KINDS, rank_table, simulate_ranks
 
     settings: dict[str, int] = {"simulations": simulations, "seed": seed}
     listed, planted = cells(), model_cells()
@@ -377,10 +377,10 @@ def results_of_study(
     simplifications: Mapping[str, Simplification],
 ) -> list[TextureResult]:
     """Recordings, models and verdicts of every texture that was asked about."""
-    from analysis.textures.between import left_out_by_model
-    from analysis.textures.results import TextureResult
-    from modeling.files.writing import file_stem
-    from modeling.fitting.conditions import recording_spectra
+    from tactileq.analysis.textures.between import left_out_by_model
+    from tactileq.analysis.textures.results import TextureResult
+    from tactileq.modeling.files.writing import file_stem
+    from tactileq.modeling.fitting.conditions import recording_spectra
 
     results = []
     for texture in responses.textures:

@@ -16,10 +16,10 @@ from tactileq.printing import progress
 from tactileq.workers import working
 
 if TYPE_CHECKING:
-    from benches.chart.chart import Chart
-    from benches.chart.surfaces import Origin
-    from benches.rendering.bench import RenderingBench
-    from modeling.files.folders import Contents
+    from tactileq.benches.chart.chart import Chart
+    from tactileq.benches.chart.surfaces import Origin
+    from tactileq.benches.rendering.bench import RenderingBench
+    from tactileq.modeling.files.folders import Contents
 
 bench = typer.Typer(
     no_args_is_help=True,
@@ -92,8 +92,8 @@ def bench_chart(
 
     Example: tactileq bench chart --recordings recordings/cork --out chart
     """
-    from benches.chart.methods import chosen_methods
-    from benches.chart.page import plotly_script
+    from tactileq.benches.chart.methods import chosen_methods
+    from tactileq.benches.chart.page import plotly_script
 
     seen = check_own_results(out, "bench chart")
     methods = chosen_methods(method or [], full=full)
@@ -124,7 +124,7 @@ def chart_sources(
     ValueError
         For models without recordings, and a texture of which a folder holds no model.
     """
-    from benches.chart.surfaces import (
+    from tactileq.benches.chart.surfaces import (
         ALL_SURFACES,
         USUAL,
         recorded_sources,
@@ -148,8 +148,8 @@ def charted(
     dask: str | None = None,
 ) -> Chart:
     """Judge all textures, several at a time, then time rendering with nothing else running."""
-    from benches.chart.chart import chart_of
-    from benches.chart.judging import Judged, judge
+    from tactileq.benches.chart.chart import chart_of
+    from tactileq.benches.chart.judging import Judged, judge
 
     made = dict[int, Judged]()
     with progress("Modeling and judging", len(sources)) as advance:
@@ -162,9 +162,9 @@ def charted(
 
 
 def _write_chart(chart: Chart, out: Path, *, seen: Contents, settings: dict[str, object]) -> None:
-    from benches.chart.page import chart_files
-    from modeling.files.folders import replace_folder
-    from modeling.files.provenance import provenance_of, seal_folder
+    from tactileq.benches.chart.page import chart_files
+    from tactileq.modeling.files.folders import replace_folder
+    from tactileq.modeling.files.provenance import provenance_of, seal_folder
 
     with replace_folder(out, seen) as fresh:
         for name, data in chart_files(chart).items():
@@ -174,13 +174,13 @@ def _write_chart(chart: Chart, out: Path, *, seen: Contents, settings: dict[str,
 
 def bench_rendering_into(out: Path, *, quick: bool, plot: bool) -> None:
     """Time the renderer and its rivals; print and write the results."""
-    from analysis.columns import tsv_text
-    from analysis.page.saving import DOTS_PER_INCH
-    from benches.rendering.bench import QUICK, BenchEffort, bench_rendering
-    from benches.rendering.figure import figure_rendering
-    from modeling.files.folders import replace_folder
-    from modeling.files.provenance import provenance_of, seal_folder
-    from modeling.files.writing import write_text
+    from tactileq.analysis.columns import tsv_text
+    from tactileq.analysis.page.saving import DOTS_PER_INCH
+    from tactileq.benches.rendering.bench import QUICK, BenchEffort, bench_rendering
+    from tactileq.benches.rendering.figure import figure_rendering
+    from tactileq.modeling.files.folders import replace_folder
+    from tactileq.modeling.files.provenance import provenance_of, seal_folder
+    from tactileq.modeling.files.writing import write_text
 
     seen = check_own_results(out, "bench render")
     effort = QUICK if quick else BenchEffort()

@@ -21,10 +21,10 @@ from tactileq.printing import progress, share_of
 from tactileq.workers import mapping
 
 if TYPE_CHECKING:
-    from analysis.page.sections import Mapped, Section
-    from analysis.textures.results import TextureResult
-    from modeling import ARModel, Threshold
-    from stimuli.sets.recipe import Recipe
+    from tactileq.analysis.page.sections import Mapped, Section
+    from tactileq.analysis.textures.results import TextureResult
+    from tactileq.modeling import ARModel, Threshold
+    from tactileq.stimuli.sets.recipe import Recipe
 
 
 def demo(
@@ -50,12 +50,12 @@ def demo(
 
         demo_on_devices(out, seed)
         return
-    from experiments.study.study import Study
-    from modeling import Threshold
-    from modeling.files.folders import replace_folder
-    from modeling.files.provenance import provenance_of, seal_folder
-    from modeling.threads import one_linear_algebra_thread
-    from stimuli.planted.textures import TEXTURES
+    from tactileq.experiments.study.study import Study
+    from tactileq.modeling import Threshold
+    from tactileq.modeling.files.folders import replace_folder
+    from tactileq.modeling.files.provenance import provenance_of, seal_folder
+    from tactileq.modeling.threads import one_linear_algebra_thread
+    from tactileq.stimuli.planted.textures import TEXTURES
 
     seen = check_own_results(out, "demo")
     plan = Study.load()
@@ -112,7 +112,7 @@ def demo(
 
 def demo_recipe(folder: Path, *, seed: int) -> Recipe:
     """One second of every full and simplified model of the demo at 150 mm/s and 1.5 N."""
-    from stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
+    from tactileq.stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
 
     models = {"full": folder / "models", "simplified": folder / "simplified"}
     return Recipe(
@@ -125,8 +125,8 @@ def demo_recipe(folder: Path, *, seed: int) -> Recipe:
 
 def demo_texture(name: str, folder: Path, *, threshold: Threshold, seed: int) -> TextureResult:
     """Record, model and simplify one planted texture; everything goes by way of the disk."""
-    from modeling.files.writing import file_stem
-    from stimuli.planted.textures import RECORDER_RATE_HZ, planted_texture, record_texture
+    from tactileq.modeling.files.writing import file_stem
+    from tactileq.stimuli.planted.textures import RECORDER_RATE_HZ, planted_texture, record_texture
 
     truth = planted_texture(name, rate_hz=RECORDER_RATE_HZ)
     record_texture(truth, seed=seed).save(folder / "recordings" / file_stem(name))
@@ -138,10 +138,10 @@ def with_checks(result: TextureResult) -> tuple[TextureResult, ARModel]:
 
     That is the paper's own model, and conditions left out.
     """
-    from analysis.textures.between import RIVAL_ORDER, left_out_by_model
-    from modeling.fitting.autoregressive import fit_ar_spectra
-    from modeling.fitting.conditions import recording_spectra
-    from modeling.fitting.texture import fit_spectra
+    from tactileq.analysis.textures.between import RIVAL_ORDER, left_out_by_model
+    from tactileq.modeling.fitting.autoregressive import fit_ar_spectra
+    from tactileq.modeling.fitting.conditions import recording_spectra
+    from tactileq.modeling.fitting.texture import fit_spectra
 
     measured = recording_spectra(result.recordings)
     checked = replace(
@@ -163,8 +163,8 @@ def write_demo_report(
     mapped: Mapped,
 ) -> None:
     """The report of everything in the demo's folder, with a progress bar."""
-    from analysis.answers.hand import load_hand
-    from analysis.report.report import write_report
+    from tactileq.analysis.answers.hand import load_hand
+    from tactileq.analysis.report.report import write_report
 
     responses = read_answers({"": folder / "data"}, ())
     with share_of("Analyzing") as advance:

@@ -15,9 +15,9 @@ from tactileq.printing import progress, share_of
 from tactileq.workers import mapping
 
 if TYPE_CHECKING:
-    from analysis.textures.results import TextureResult
-    from experiments.study.study import Study
-    from modeling import TextureModel, Threshold
+    from tactileq.analysis.textures.results import TextureResult
+    from tactileq.experiments.study.study import Study
+    from tactileq.modeling import TextureModel, Threshold
 
 PARTICIPANTS = 4  # of each task; each of their hands takes minutes of virtual time
 
@@ -32,17 +32,17 @@ def demo_on_devices(out: Path, seed: int, study: Study | None = None) -> None:
     """
     import pandas as pd
 
-    from analysis.answers.hand import load_hand
-    from analysis.report.report import write_report
-    from benches.recorder.section import recorder_section
-    from benches.recorder.tables import near_table, records_of
-    from modeling import Threshold
-    from modeling.files.folders import replace_folder
-    from modeling.files.provenance import provenance_of, seal_folder
-    from modeling.files.writing import file_stem
-    from modeling.threads import one_linear_algebra_thread
-    from rig.device_twin import DeviceTwin
-    from stimuli.planted.textures import PlantedSurface
+    from tactileq.analysis.answers.hand import load_hand
+    from tactileq.analysis.report.report import write_report
+    from tactileq.benches.recorder.section import recorder_section
+    from tactileq.benches.recorder.tables import near_table, records_of
+    from tactileq.modeling import Threshold
+    from tactileq.modeling.files.folders import replace_folder
+    from tactileq.modeling.files.provenance import provenance_of, seal_folder
+    from tactileq.modeling.files.writing import file_stem
+    from tactileq.modeling.threads import one_linear_algebra_thread
+    from tactileq.rig.device_twin import DeviceTwin
+    from tactileq.stimuli.planted.textures import PlantedSurface
 
     seen = check_own_results(out, "demo --device")
     plan, threshold = study or device_study(), Threshold.named("mobile")
@@ -111,7 +111,7 @@ def demo_on_devices(out: Path, seed: int, study: Study | None = None) -> None:
 
 def device_study() -> Study:
     """The paper's study with few participants and one repeat."""
-    from experiments.study.study import Study
+    from tactileq.experiments.study.study import Study
 
     tables = Study.load().to_tables()
     for task in ("absolute", "relative"):
@@ -125,9 +125,9 @@ def recorded_texture(
     name: str, folder: Path, *, threshold: Threshold, seed: int
 ) -> tuple[TextureResult, TextureModel]:
     """A planted texture from the simulated recorder, and a model of the direct route."""
-    from modeling import fit_texture
-    from modeling.files.writing import file_stem
-    from stimuli.planted.textures import RECORDER_RATE_HZ, planted_texture, record_texture
+    from tactileq.modeling import fit_texture
+    from tactileq.modeling.files.writing import file_stem
+    from tactileq.stimuli.planted.textures import RECORDER_RATE_HZ, planted_texture, record_texture
     from tactileq.commands.record_recorder import RecorderRecording, record_quietly
 
     truth = planted_texture(name, rate_hz=RECORDER_RATE_HZ)

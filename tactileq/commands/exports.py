@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from modeling.errors import counted
+from tactileq.modeling.errors import counted
 from tactileq.commands.stimuli import print_beyond_grid, recipe_from
 from tactileq.options import ModelFile, Seed, VibratorFile
 from tactileq.own_results import note_of_file, write_own_files
@@ -125,14 +125,14 @@ def export_c_header(
 ) -> None:
     """Write a model and the kernel as one C header, with provenance.
 
-    `limits` are those of `modeling.Limits`, None for none.
+    `limits` are those of `tactileq.modeling.Limits`, None for none.
     """
-    from modeling import Limits, Vibrator, compensation_for
-    from modeling.files.hashes import sha256_of_paths
-    from modeling.files.provenance import provenance_of
-    from modeling.files.writing import file_stem
-    from modeling.models.loading import load_model
-    from stimuli.exports.c_header import c_header
+    from tactileq.modeling import Limits, Vibrator, compensation_for
+    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.modeling.files.provenance import provenance_of
+    from tactileq.modeling.files.writing import file_stem
+    from tactileq.modeling.models.loading import load_model
+    from tactileq.stimuli.exports.c_header import c_header
 
     inputs = sha256_of_paths(path for path in (model_file, vibrator) if path is not None)
     model = load_model(model_file)
@@ -172,12 +172,12 @@ def export_wav_file(
     vibrator: Path | None,
 ) -> None:
     """Write a model's vibration at one speed and force, with provenance; print its level."""
-    from modeling.files.hashes import sha256_of_paths
-    from modeling.files.provenance import provenance_of
-    from modeling.files.writing import file_stem
-    from modeling.models.loading import load_model
-    from stimuli.exports.wav import only_stimulus
-    from stimuli.sets.sources import load_sources
+    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.modeling.files.provenance import provenance_of
+    from tactileq.modeling.files.writing import file_stem
+    from tactileq.modeling.models.loading import load_model
+    from tactileq.stimuli.exports.wav import only_stimulus
+    from tactileq.stimuli.sets.sources import load_sources
 
     model = load_model(model_file)
     target = out or Path(f"{file_stem(model.texture)}.wav")
@@ -212,12 +212,12 @@ def export_peq_json(
     model_file: Path, out: Path | None, *, speed: float | None, force: float | None
 ) -> None:
     """Write a model's equalizer at one condition or over its grid as JSON, with provenance."""
-    from modeling.files.documents import dump_json
-    from modeling.files.hashes import sha256_of_paths
-    from modeling.files.provenance import provenance_of
-    from modeling.files.writing import file_stem
-    from modeling.models.loading import load_model
-    from stimuli.exports.peq_json import peq_document
+    from tactileq.modeling.files.documents import dump_json
+    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.modeling.files.provenance import provenance_of
+    from tactileq.modeling.files.writing import file_stem
+    from tactileq.modeling.models.loading import load_model
+    from tactileq.stimuli.exports.peq_json import peq_document
 
     inputs = sha256_of_paths([model_file])
     model = load_model(model_file)

@@ -11,7 +11,7 @@ import typer
 from tactileq.options import Criterion, HoldAbove, ThresholdName, VibratorFile
 
 if TYPE_CHECKING:
-    from experiments.feel.live_rig import LiveRig
+    from tactileq.experiments.feel.live_rig import LiveRig
 
 
 def feel(
@@ -50,11 +50,11 @@ def feel(
 
     Example: tactileq feel models/canvas.json
     """
-    from experiments.feel.textures import load_textures
-    from experiments.feel.view import FeltCriterion
-    from experiments.feel.visit import Visit
-    from experiments.feel.window import FeelWindow
-    from modeling import Threshold
+    from tactileq.experiments.feel.textures import load_textures
+    from tactileq.experiments.feel.view import FeltCriterion
+    from tactileq.experiments.feel.visit import Visit
+    from tactileq.experiments.feel.window import FeelWindow
+    from tactileq.modeling import Threshold
 
     textures = load_textures(models, simplified)
     yardstick = FeltCriterion(
@@ -71,8 +71,8 @@ def feel(
 
 def opened_rig(rig: Path | None, vibrator: Path | None) -> AbstractContextManager[LiveRig]:
     """The rig of this file, or what any computer has."""
-    from experiments.feel.opening import demonstration, desk
-    from modeling import Vibrator
+    from tactileq.experiments.feel.opening import demonstration, desk
+    from tactileq.modeling import Vibrator
 
     if rig is None:
         return demonstration(None if vibrator is None else Vibrator.load(vibrator))

@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from modeling.errors import counted, shown
+from tactileq.modeling.errors import counted, shown
 from tactileq.options import Out, Seed
 from tactileq.printing import clipping_warnings, progress
 
 if TYPE_CHECKING:
-    from modeling import RecordingSet
-    from rig.importing.files import Imported
-    from rig.importing.hatt import HattTexture
-    from rig.importing.hatt_grid import ToolkitGrid
-    from rig.importing.labels import Label
+    from tactileq.modeling import RecordingSet
+    from tactileq.rig.importing.files import Imported
+    from tactileq.rig.importing.hatt import HattTexture
+    from tactileq.rig.importing.hatt_grid import ToolkitGrid
+    from tactileq.rig.importing.labels import Label
 
 imports = typer.Typer(
     no_args_is_help=True,
@@ -68,8 +68,8 @@ def import_wav(
 
     Example: tactileq import wav *.wav --labels labels.tsv --texture oak --g-per-fullscale 16
     """
-    from modeling.files.hashes import sha256_of_paths
-    from rig.importing.files import import_wav_file, usable
+    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.rig.importing.files import import_wav_file, usable
 
     inputs = sha256_of_paths(files)
     named = labels_of(files, labels, texture=texture or out.name, speed=speed, force=force)
@@ -121,9 +121,9 @@ def import_csv(
 
     Example: tactileq import csv *.csv --labels labels.tsv --map time=Zeit,z=Kanal_1 --mv-per-g 100
     """
-    from modeling.files.hashes import sha256_of_paths
-    from rig.importing.csv_columns import parse_columns
-    from rig.importing.files import import_csv_file, usable
+    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.rig.importing.csv_columns import parse_columns
+    from tactileq.rig.importing.files import import_csv_file, usable
 
     role_of = parse_columns(columns) if columns is not None else {}
     if time_column is not None:
@@ -185,11 +185,11 @@ def import_hatt(
 
     Example: tactileq import hatt "Models_Canvas 1.xml" --speed 100 --speed 200 --force 1 --force 2
     """
-    from modeling.files.hashes import sha256_of_paths
-    from rig.importing.files import Imported
-    from rig.importing.hatt_grid import spanning_grid
-    from rig.importing.hatt_reader import load_hatt
-    from rig.importing.plausible import doubts_about
+    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.rig.importing.files import Imported
+    from tactileq.rig.importing.hatt_grid import spanning_grid
+    from tactileq.rig.importing.hatt_reader import load_hatt
+    from tactileq.rig.importing.plausible import doubts_about
 
     if own_conditions and (speed or force):
         raise ValueError(
@@ -283,7 +283,7 @@ def labels_of(
     force: float | None,
 ) -> list[Label]:
     """Labels of the files from a table, or the same speed and force for all of them."""
-    from rig.importing.labels import Label, labels_from_table
+    from tactileq.rig.importing.labels import Label, labels_from_table
 
     if table is not None:
         if speed is not None or force is not None:
@@ -324,10 +324,10 @@ def add_to_set(
     could not be used. Implausible values are refused or, if `yes`, warned about and written into
     the provenance.
     """
-    from modeling import RecordingSet
-    from modeling.files.places import locked
-    from modeling.files.provenance import PROVENANCE_NAME, provenance_of, provenance_text
-    from modeling.recordings.appending import staged
+    from tactileq.modeling import RecordingSet
+    from tactileq.modeling.files.places import locked
+    from tactileq.modeling.files.provenance import PROVENANCE_NAME, provenance_of, provenance_text
+    from tactileq.modeling.recordings.appending import staged
 
     doubts = [doubt for one in new for doubt in one.doubts]
     if doubts and not yes:
@@ -395,7 +395,7 @@ def imports_before(provenance: Path) -> list[dict[str, Any]]:
 
     Nested, each would be indented deeper with every import.
     """
-    from modeling.files.documents import read_json_object
+    from tactileq.modeling.files.documents import read_json_object
 
     entry: Any = None
     if provenance.is_file():

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from modeling.errors import counted
+from tactileq.modeling.errors import counted
 from tactileq.many_textures import HowToModel, TextureOutcome, model_textures
 from tactileq.options import Out
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from modeling.errors import shown
+from tactileq.modeling.errors import shown
 from tactileq.commands.session import models_of_study
 from tactileq.options import (
     Models,
@@ -26,8 +26,8 @@ from tactileq.printing import print_models, progress
 if TYPE_CHECKING:
     import pandas as pd
 
-    from experiments.study.study import Study
-    from modeling.files.folders import Contents
+    from tactileq.experiments.study.study import Study
+    from tactileq.modeling.files.folders import Contents
 
 PICTURE_DPI = 150
 
@@ -75,8 +75,8 @@ def power(
 
     Example: tactileq power study.toml --subjects 12,48,12 --effect magnitude_similarity=0
     """
-    from experiments.study.study import Study
-    from modeling.files.hashes import sha256_of_paths
+    from tactileq.experiments.study.study import Study
+    from tactileq.modeling.files.hashes import sha256_of_paths
 
     seen = check_own_results(out, "power")
     inputs = sha256_of_paths([study])
@@ -154,7 +154,7 @@ def planted_effects(effects: Sequence[str], textures: Sequence[str]) -> dict[str
     ValueError
         For another form, or a texture that is not in the study.
     """
-    from experiments.observers.psychometrics import EFFECTS
+    from tactileq.experiments.observers.psychometrics import EFFECTS
 
     planted: dict[str, dict[str, float]] = {}
     for text in effects:
@@ -189,12 +189,12 @@ def _write(
     settings: dict[str, object],
     inputs: Mapping[str, str],
 ) -> None:
-    from analysis.columns import tsv_text
-    from analysis.page.saving import save_figure, svg_of
-    from analysis.power.figure import figure_power
-    from modeling.files.folders import replace_folder
-    from modeling.files.provenance import provenance_of, seal_folder
-    from modeling.files.writing import write_text
+    from tactileq.analysis.columns import tsv_text
+    from tactileq.analysis.page.saving import save_figure, svg_of
+    from tactileq.analysis.power.figure import figure_power
+    from tactileq.modeling.files.folders import replace_folder
+    from tactileq.modeling.files.provenance import provenance_of, seal_folder
+    from tactileq.modeling.files.writing import write_text
 
     provenance = provenance_of("power", settings, seed=seed, inputs=inputs)
     marked = table.assign(simulated="true")
@@ -210,7 +210,7 @@ def _write(
 
 
 def _sentences(table: pd.DataFrame, plan: Study, out: Path) -> list[str]:
-    from analysis.answers.plan import plan_from
-    from analysis.power.power import power_sentences
+    from tactileq.analysis.answers.plan import plan_from
+    from tactileq.analysis.power.power import power_sentences
 
     return power_sentences(table, claims=plan_from(plan.plan.to_dict(), path=out).claims)

@@ -44,12 +44,12 @@ def publish(
 
     Example: tactileq publish data --study study.toml --out archive
     """
-    from experiments.study.study import Study
-    from modeling import InputError
-    from modeling.errors import counted
-    from modeling.files.folders import replace_folder
-    from modeling.files.hashes import seal_over, sha256_of_paths
-    from modeling.files.provenance import provenance_of, seal_folder, sha256_of_files
+    from tactileq.experiments.study.study import Study
+    from tactileq.modeling import InputError
+    from tactileq.modeling.errors import counted
+    from tactileq.modeling.files.folders import replace_folder
+    from tactileq.modeling.files.hashes import seal_over, sha256_of_paths
+    from tactileq.modeling.files.provenance import provenance_of, seal_folder, sha256_of_files
     from tactileq.archive import COMMAND, DATA
     from tactileq.archive_metadata import Publication
     from tactileq.bids_validator import bids_issues, said_of
@@ -114,8 +114,8 @@ def _places(models: list[str] | None) -> dict[str, Path]:
 
 def _options_of(results: Path, data: Path) -> dict[str, Any]:
     """The options of the analysis of these data."""
-    from modeling.files.documents import read_json_object
-    from modeling.files.provenance import PROVENANCE_NAME
+    from tactileq.modeling.files.documents import read_json_object
+    from tactileq.modeling.files.provenance import PROVENANCE_NAME
     from tactileq.verified_results import require_data
 
     note = read_json_object(results / PROVENANCE_NAME, advice="name a folder of results")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from modeling.errors import counted
+from tactileq.modeling.errors import counted
 from tactileq.options import AssumedForce, CountsPerMm, HandDevice, HandKind, OptionalRigPath, Seed
 from tactileq.printing import progress
 
@@ -113,9 +113,9 @@ def record_in_silico(
     folder: Path, texture: str, *, rate_hz: float | None, duration_s: float, seed: int
 ) -> None:
     """Record a planted texture, 7 speeds x 7 forces."""
-    from modeling.files.folders import folder_behind, replace_folder
-    from modeling.files.provenance import write_provenance
-    from stimuli.planted.textures import RECORDER_RATE_HZ, planted_texture, record_texture
+    from tactileq.modeling.files.folders import folder_behind, replace_folder
+    from tactileq.modeling.files.provenance import write_provenance
+    from tactileq.stimuli.planted.textures import RECORDER_RATE_HZ, planted_texture, record_texture
 
     rate_hz = RECORDER_RATE_HZ if rate_hz is None else rate_hz
     folder_behind(folder)

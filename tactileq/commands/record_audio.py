@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from modeling.errors import counted
+from tactileq.modeling.errors import counted
 from tactileq.commands.imports import imports_before
 from tactileq.commands.record_map import recording_map
 from tactileq.commands.record_more import NOTHING_MORE, further_conditions
@@ -18,15 +18,15 @@ from tactileq.commands.record_more import NOTHING_MORE, further_conditions
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from rig.capture.cutting import Readings
-    from rig.capture.grid import StrokeGrid
-    from rig.capture.input import InputSettings
-    from rig.capture.pieces import Plan
-    from rig.capture.recorder import StrokeRecorder
-    from rig.hand.reader import HandReader
-    from rig.hand.settings import HandSettings
-    from rig.live.memory import Live
-    from rig.setup.rig_file import RigFile
+    from tactileq.rig.capture.cutting import Readings
+    from tactileq.rig.capture.grid import StrokeGrid
+    from tactileq.rig.capture.input import InputSettings
+    from tactileq.rig.capture.pieces import Plan
+    from tactileq.rig.capture.recorder import StrokeRecorder
+    from tactileq.rig.hand.reader import HandReader
+    from tactileq.rig.hand.settings import HandSettings
+    from tactileq.rig.live.memory import Live
+    from tactileq.rig.setup.rig_file import RigFile
 
 STEP_S = 0.05
 MOST_MISSING = 6
@@ -80,7 +80,7 @@ def hand_from(rig: RigFile | None, options: HandOptions) -> HandSettings:
 
 
 def _hand_of_rig(rig: RigFile, options: HandOptions) -> HandSettings:
-    from rig.desk.parts import hand_settings
+    from tactileq.rig.desk.parts import hand_settings
 
     if options != HandOptions():
         raise ValueError(
@@ -91,7 +91,7 @@ def _hand_of_rig(rig: RigFile, options: HandOptions) -> HandSettings:
 
 
 def _hand_of_options(options: HandOptions) -> HandSettings:
-    from rig.hand.settings import HandSettings
+    from tactileq.rig.hand.settings import HandSettings
 
     if options.kind is None:
         raise ValueError(
@@ -108,7 +108,7 @@ def _hand_of_options(options: HandOptions) -> HandSettings:
 
 def input_from(rig: RigFile | None, options: InputOptions) -> InputSettings:
     """The accelerometer of a rig file, with what the command line says otherwise."""
-    from rig.capture.input import InputSettings
+    from tactileq.rig.capture.input import InputSettings
 
     section = None if rig is None else rig.accelerometer
     scale = options.g_per_fullscale
@@ -135,7 +135,7 @@ def rig_from(path: Path | None) -> RigFile | None:
     """The rig file, where one is given."""
     if path is None:
         return None
-    from rig.setup.rig_file import RigFile
+    from tactileq.rig.setup.rig_file import RigFile
 
     return RigFile.load(path)
 
@@ -144,9 +144,9 @@ def record_by_hand(folder: Path, options: HandRecording) -> None:
     """Record strokes until the grid is full, or until the program is asked to end."""
     import numpy as np
 
-    from modeling.models.grid import grid_axes
-    from rig.capture.grid import StrokeGrid
-    from rig.capture.recorder import check_assumed_force
+    from tactileq.modeling.models.grid import grid_axes
+    from tactileq.rig.capture.grid import StrokeGrid
+    from tactileq.rig.capture.recorder import check_assumed_force
 
     if options.more and options.grid is not None:
         raise ValueError(
@@ -181,10 +181,10 @@ def record_on(
     heard: InputSettings,
 ) -> None:
     """Open the devices, and record until the grid is full."""
-    from rig.capture.input import AudioInput
-    from rig.capture.pieces import PieceStore, Plan
-    from rig.capture.recorder import StrokeRecorder
-    from rig.desk.lock import rig_locked
+    from tactileq.rig.capture.input import AudioInput
+    from tactileq.rig.capture.pieces import PieceStore, Plan
+    from tactileq.rig.capture.recorder import StrokeRecorder
+    from tactileq.rig.desk.lock import rig_locked
 
     alone = nullcontext() if rig is None else rig_locked(rig.rig.name)
     with alone, opened_hand(hand) as (live, reader), AudioInput(heard) as source:
@@ -221,8 +221,8 @@ def provenance_of_run(
     folder: Path, options: HandRecording, plan: Plan, *, settings: Mapping[str, Any]
 ) -> dict[str, Any]:
     """What the recordings of this run came from, with what made those before them."""
-    from modeling.files.hashes import sha256_of_paths
-    from modeling.files.provenance import PROVENANCE_NAME, provenance_of
+    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.modeling.files.provenance import PROVENANCE_NAME, provenance_of
 
     every = {
         "texture": plan.texture,
@@ -263,8 +263,8 @@ def since_now(live: Live) -> Callable[[], Readings]:
 @contextmanager
 def opened_hand(hand: HandSettings) -> Iterator[tuple[Live, HandReader]]:
     """The shared memory, and the hand that writes its readings into it."""
-    from rig.hand.reader import HandReader
-    from rig.live.memory import Live
+    from tactileq.rig.hand.reader import HandReader
+    from tactileq.rig.live.memory import Live
 
     with Live.create() as live, HandReader(live, hand) as reader:
         yield live, reader

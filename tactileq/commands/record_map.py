@@ -10,9 +10,9 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
-    from modeling.models.grid import Condition
-    from rig.capture.coverage import Coverage
-    from rig.capture.recorder import HandLately, InputLevel, StrokeRecorder
+    from tactileq.modeling.models.grid import Condition
+    from tactileq.rig.capture.coverage import Coverage
+    from tactileq.rig.capture.recorder import HandLately, InputLevel, StrokeRecorder
 
 # Okabe–Ito blue and orange; characters in each cell repeat what its colour means.
 FULL, PART, NEXT = "#56B4E9", "#E69F00", "bold reverse"

@@ -6,12 +6,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from modeling.errors import InputError, counted
+from tactileq.modeling.errors import InputError, counted
 from tactileq.printing import left_out_warnings, progress
 
 if TYPE_CHECKING:
-    from modeling import RecordingSet
-    from modeling.models.grid import Condition
+    from tactileq.modeling import RecordingSet
+    from tactileq.modeling.models.grid import Condition
 
 NOTHING_MORE = "no condition is predicted much worse than the others; nothing more is asked for"
 
@@ -36,11 +36,11 @@ def further_conditions(folder: Path, texture: str) -> list[Condition]:
         For a folder without recordings of the texture in g, or with too few to leave any out, or
         on a line across the grid.
     """
-    from analysis.textures.between import fit_like, left_out_table, worth_recording
-    from analysis.textures.wanted import half_way_to_neighbours
-    from modeling.fitting.conditions import recording_spectra
-    from modeling.fitting.texture import fit_spectra
-    from modeling.threads import one_linear_algebra_thread
+    from tactileq.analysis.textures.between import fit_like, left_out_table, worth_recording
+    from tactileq.analysis.textures.wanted import half_way_to_neighbours
+    from tactileq.modeling.fitting.conditions import recording_spectra
+    from tactileq.modeling.fitting.texture import fit_spectra
+    from tactileq.modeling.threads import one_linear_algebra_thread
 
     records = _recorded(folder, texture)
     with one_linear_algebra_thread(), progress("Predicting conditions left out", 3) as advance:
@@ -69,8 +69,8 @@ def further_conditions(folder: Path, texture: str) -> list[Condition]:
 
 def _recorded(folder: Path, texture: str) -> RecordingSet:
     """The usable recordings of a texture, in g; a warning names the others."""
-    from modeling.fitting.conditions import only_unit
-    from modeling.recordings.recording_set import is_recording_set, load_usable, textures_in
+    from tactileq.modeling.fitting.conditions import only_unit
+    from tactileq.modeling.recordings.recording_set import is_recording_set, load_usable, textures_in
 
     found = textures_in(folder) if is_recording_set(folder) else ()
     if texture not in found:

@@ -9,19 +9,19 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from modeling.errors import InputError, counted
+from tactileq.modeling.errors import InputError, counted
 from tactileq.commands.imports import imports_before
 from tactileq.commands.record_more import NOTHING_MORE, further_conditions
 from tactileq.printing import progress
 
 if TYPE_CHECKING:
-    from modeling.arrays import Floats
-    from modeling.models.grid import Condition
-    from rig.capture.grid import StrokeGrid
-    from rig.recorder.driver import Recorder, RecorderWire, VirtualWire
-    from rig.recorder.recorder_file import RecorderFile
-    from rig.recorder.recording import PlanRun
-    from rig.recorder.sensors import Sensor
+    from tactileq.modeling.arrays import Floats
+    from tactileq.modeling.models.grid import Condition
+    from tactileq.rig.capture.grid import StrokeGrid
+    from tactileq.rig.recorder.driver import Recorder, RecorderWire, VirtualWire
+    from tactileq.rig.recorder.recorder_file import RecorderFile
+    from tactileq.rig.recorder.recording import PlanRun
+    from tactileq.rig.recorder.sensors import Sensor
 
 MOST_REFUSED = 3
 
@@ -41,8 +41,8 @@ class RecorderRecording:
 
 def record_on_recorder(folder: Path, recorder: str, options: RecorderRecording) -> None:
     """Record what the folder misses, until nothing is missing."""
-    from rig.recorder.driver import Recorder
-    from rig.recorder.recorder_file import IN_VIRTUAL_TIME, SHIPPED_RECORDER_FILE, RecorderFile
+    from tactileq.rig.recorder.driver import Recorder
+    from tactileq.rig.recorder.recorder_file import IN_VIRTUAL_TIME, SHIPPED_RECORDER_FILE, RecorderFile
 
     path = SHIPPED_RECORDER_FILE if recorder == IN_VIRTUAL_TIME else Path(recorder)
     file = RecorderFile.load(path)
@@ -78,8 +78,8 @@ def record_quietly(folder: Path, options: RecorderRecording) -> None:
     InputError
         If not all of the grid was recorded.
     """
-    from rig.recorder.driver import Recorder
-    from rig.recorder.recorder_file import SHIPPED_RECORDER_FILE, RecorderFile
+    from tactileq.rig.recorder.driver import Recorder
+    from tactileq.rig.recorder.recorder_file import SHIPPED_RECORDER_FILE, RecorderFile
 
     file = RecorderFile.load(SHIPPED_RECORDER_FILE)
     grid = _grid(folder, options)
@@ -96,8 +96,8 @@ def _grid(folder: Path, options: RecorderRecording) -> StrokeGrid | None:
     """The conditions; None where nothing more is asked for."""
     import numpy as np
 
-    from modeling.models.grid import grid_axes
-    from rig.capture.grid import StrokeGrid
+    from tactileq.modeling.models.grid import grid_axes
+    from tactileq.rig.capture.grid import StrokeGrid
 
     if options.more:
         if options.grid is not None:
@@ -114,8 +114,8 @@ def _grid(folder: Path, options: RecorderRecording) -> StrokeGrid | None:
 
 
 def _check_planted(texture: str) -> None:
-    from modeling.errors import shown
-    from stimuli.planted.textures import TEXTURES
+    from tactileq.modeling.errors import shown
+    from tactileq.stimuli.planted.textures import TEXTURES
 
     if texture not in TEXTURES:
         raise InputError(
@@ -128,8 +128,8 @@ def _check_planted(texture: str) -> None:
 @contextmanager
 def _held(file: RecorderFile) -> Iterator[None]:
     """The recorder for this process alone; one in virtual time is its own."""
-    from rig.desk.lock import rig_locked
-    from rig.recorder.recorder_file import IN_VIRTUAL_TIME
+    from tactileq.rig.desk.lock import rig_locked
+    from tactileq.rig.recorder.recorder_file import IN_VIRTUAL_TIME
 
     if file.recorder.address == IN_VIRTUAL_TIME:
         yield
@@ -141,11 +141,11 @@ def _held(file: RecorderFile) -> Iterator[None]:
 @contextmanager
 def _wire(file: RecorderFile, options: RecorderRecording) -> Iterator[RecorderWire]:
     """The way to the recorder, open."""
-    from rig.recorder.definition import RECORDER
-    from rig.recorder.driver import LinkedWire
-    from rig.recorder.recorder_file import IN_VIRTUAL_TIME
-    from rig.wire.link import Link
-    from rig.wire.transports import opened_transport
+    from tactileq.rig.recorder.definition import RECORDER
+    from tactileq.rig.recorder.driver import LinkedWire
+    from tactileq.rig.recorder.recorder_file import IN_VIRTUAL_TIME
+    from tactileq.rig.wire.link import Link
+    from tactileq.rig.wire.transports import opened_transport
 
     address, baud = file.recorder.address, file.recorder.baud
     if address == IN_VIRTUAL_TIME:
@@ -157,8 +157,8 @@ def _wire(file: RecorderFile, options: RecorderRecording) -> Iterator[RecorderWi
 
 def _virtual(options: RecorderRecording) -> VirtualWire:
     """A recorder in virtual time, with what seed, texture and repeat mount."""
-    from modeling.seeds import noise_stream
-    from rig.recorder.driver import VirtualWire
+    from tactileq.modeling.seeds import noise_stream
+    from tactileq.rig.recorder.driver import VirtualWire
 
     mounted = noise_stream(str(options.seed), options.texture, str(options.repeat))
     return VirtualWire(entropy=mounted % 2**32)
@@ -167,8 +167,8 @@ def _virtual(options: RecorderRecording) -> VirtualWire:
 @contextmanager
 def _sensor(file: RecorderFile, device: Recorder, options: RecorderRecording) -> Iterator[Sensor]:
     """What measures the vibration, open."""
-    from rig.capture.input import AudioInput, InputSettings
-    from rig.recorder.sensors import DrawnVibration, EvaluationFiles, SoundCardSensor
+    from tactileq.rig.capture.input import AudioInput, InputSettings
+    from tactileq.rig.recorder.sensors import DrawnVibration, EvaluationFiles, SoundCardSensor
 
     settings = file.sensor
     if file.simulated:
@@ -200,9 +200,9 @@ def _sensor(file: RecorderFile, device: Recorder, options: RecorderRecording) ->
 
 def _drawing(options: RecorderRecording, rate_hz: float) -> Any:
     """Draws the planted texture's vibration at the speed and force that emerged."""
-    from modeling.seeds import noise_stream
-    from rig.capture.grid import StrokeGrid
-    from stimuli.planted.textures import vibration_at
+    from tactileq.modeling.seeds import noise_stream
+    from tactileq.rig.capture.grid import StrokeGrid
+    from tactileq.stimuli.planted.textures import vibration_at
 
     usual = StrokeGrid.default().conditions
 
@@ -232,9 +232,9 @@ def _plan_run(
     sensor: Sensor,
 ) -> PlanRun:
     """What is still to be recorded into the folder."""
-    from rig.capture.pieces import Plan
-    from rig.recorder.recording import PlanRun
-    from rig.recorder.store import RecorderStore
+    from tactileq.rig.capture.pieces import Plan
+    from tactileq.rig.recorder.recording import PlanRun
+    from tactileq.rig.recorder.store import RecorderStore
 
     plan = Plan(
         options.texture,
@@ -286,8 +286,8 @@ def _tell(run: PlanRun) -> None:
 def _provenance(
     folder: Path, options: RecorderRecording, plan: Any, file: RecorderFile
 ) -> dict[str, Any]:
-    from modeling.files.hashes import sha256_of_paths
-    from modeling.files.provenance import PROVENANCE_NAME, provenance_of
+    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.modeling.files.provenance import PROVENANCE_NAME, provenance_of
 
     settings = {
         "texture": plan.texture,

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from modeling.errors import counted
+from tactileq.modeling.errors import counted
 from tactileq.options import RigPath, Seed
 
 if TYPE_CHECKING:
-    from rig.calibration.measuring import Accelerometer
-    from rig.setup.rig_file import RigFile
-    from rig.sound.vibration import VibrationOutput
+    from tactileq.rig.calibration.measuring import Accelerometer
+    from tactileq.rig.setup.rig_file import RigFile
+    from tactileq.rig.sound.vibration import VibrationOutput
 
 What = Literal["floor", "vibrator", "level", "pressure"]
 
@@ -52,7 +52,7 @@ def rig_calibrate(
 
     Example: tactileq rig calibrate level --rig rig.toml
     """
-    from rig.setup.rig_file import RigFile
+    from tactileq.rig.setup.rig_file import RigFile
 
     loaded = RigFile.load(rig)
     if what == "pressure":
@@ -65,10 +65,10 @@ def rig_calibrate(
 
 
 def _floor(rig: RigFile) -> None:
-    from rig.calibration.floor import SHORTEST_FLOOR_S, no_contact_floor
-    from rig.calibration.measuring import Accelerometer
-    from rig.calibration.opening import accelerometer_input
-    from rig.calibration.steps import floor_figures
+    from tactileq.rig.calibration.floor import SHORTEST_FLOOR_S, no_contact_floor
+    from tactileq.rig.calibration.measuring import Accelerometer
+    from tactileq.rig.calibration.opening import accelerometer_input
+    from tactileq.rig.calibration.steps import floor_figures
 
     with accelerometer_input(rig) as source:
         _ask("Put the pen down and touch nothing")
@@ -87,8 +87,8 @@ def _floor(rig: RigFile) -> None:
 
 
 def _vibrator(rig: RigFile, level_g: float | None, *, seed: int) -> None:
-    from rig.calibration.signals import usual_rms_g
-    from rig.calibration.steps import (
+    from tactileq.rig.calibration.signals import usual_rms_g
+    from tactileq.rig.calibration.steps import (
         IDENTIFICATION_BAND_HZ,
         check_softly,
         measure_vibrator,
@@ -118,9 +118,9 @@ def _level(
     placements: int,
     seed: int,
 ) -> None:
-    from rig.calibration.level import level_of
-    from rig.calibration.signals import usual_rms_g
-    from rig.calibration.steps import check_softly, level_figures, measure_gain
+    from tactileq.rig.calibration.level import level_of
+    from tactileq.rig.calibration.signals import usual_rms_g
+    from tactileq.rig.calibration.steps import check_softly, level_figures, measure_gain
 
     rms_g = usual_rms_g(rig.safe_limits) if level_g is None else level_g
     gains = []
@@ -145,10 +145,10 @@ def _level(
 
 
 def _pressure(rig: RigFile) -> None:
-    from rig.calibration.opening import pressure_reader
-    from rig.calibration.steps import STANDARD_GRAVITY, mean_pressure, pressure_figures
-    from rig.hand.pressure import FEWEST_WEIGHTS, fit_pressure
-    from rig.live.memory import Live
+    from tactileq.rig.calibration.opening import pressure_reader
+    from tactileq.rig.calibration.steps import STANDARD_GRAVITY, mean_pressure, pressure_figures
+    from tactileq.rig.hand.pressure import FEWEST_WEIGHTS, fit_pressure
+    from tactileq.rig.live.memory import Live
 
     weights_n: list[float] = []
     shares: list[float] = []
@@ -182,9 +182,9 @@ def _grams(*, enough: bool) -> float:
 @contextmanager
 def _bench(rig: RigFile) -> Iterator[tuple[VibrationOutput, Accelerometer]]:
     """Sound and accelerometer, open."""
-    from rig.calibration.measuring import Accelerometer
-    from rig.calibration.opening import accelerometer_input, opened_sound
-    from rig.live.memory import Live
+    from tactileq.rig.calibration.measuring import Accelerometer
+    from tactileq.rig.calibration.opening import accelerometer_input, opened_sound
+    from tactileq.rig.live.memory import Live
 
     with (
         accelerometer_input(rig) as source,
@@ -199,7 +199,7 @@ def _ask(what: str) -> None:
 
 
 def _write(rig: RigFile, figures: dict[str, object]) -> None:
-    from rig.setup.rig_file import RigFile
+    from tactileq.rig.setup.rig_file import RigFile
 
     RigFile.updated(rig.path, figures)
     print(f"{', '.join(figures)}: {rig.path}")

@@ -13,8 +13,8 @@ from tactileq.options import RigPath
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from rig.inventory import Finding
-    from rig.setup.rig_file import RigFile
+    from tactileq.rig.inventory import Finding
+    from tactileq.rig.setup.rig_file import RigFile
 
 _MARKS = {"ok": "", "note": "note", "fault": "missing"}
 _STYLES = {"ok": "", "note": "yellow", "fault": "bold red"}
@@ -31,7 +31,7 @@ def rig_check(rig: RigPath = Path("rig.toml")) -> None:
 
     from rich.console import Console
 
-    from rig.inventory import connected_input, connected_sound, of_rig, remedies, versions
+    from tactileq.rig.inventory import connected_input, connected_sound, of_rig, remedies, versions
 
     console = Console()
     loaded, of_file = of_rig(rig, today=datetime.date.today())
@@ -86,7 +86,7 @@ def _show_figures(console: Console, rig: RigFile) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from rig.setup.figures import Curve
+    from tactileq.rig.setup.figures import Curve
 
     table = Table(title="Figures", title_justify="left", box=None, pad_edge=False)
     table.add_column("figure", no_wrap=True)

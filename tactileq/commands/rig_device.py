@@ -76,7 +76,7 @@ def rig_device(
 
 
 def _emulate(kind: Kind, baud: int | None, port: int, *, recorder: bool) -> None:
-    from rig.device.emulating import Emulator
+    from tactileq.rig.device.emulating import Emulator
 
     what = "recorder" if recorder else "device"
     with Emulator(kind, baud=baud, port=port, recorder=recorder) as emulator:
@@ -96,7 +96,7 @@ def _emulate(kind: Kind, baud: int | None, port: int, *, recorder: bool) -> None
 
 
 def _write_firmware(kind: Kind, file: Path, baud: int | None, *, recorder: bool) -> None:
-    from rig.device.emulating import USUAL_BAUD, build_firmware, check_baud
+    from tactileq.rig.device.emulating import USUAL_BAUD, build_firmware, check_baud
 
     rate = baud or USUAL_BAUD[kind]
     check_baud(kind, rate)
@@ -111,9 +111,9 @@ def _write_firmware(kind: Kind, file: Path, baud: int | None, *, recorder: bool)
 
 
 def _ask(address: str, baud: int) -> None:
-    from rig.device.asking import asked
-    from rig.device.definition import DEVICE
-    from rig.recorder.definition import RECORDER
+    from tactileq.rig.device.asking import asked
+    from tactileq.rig.device.definition import DEVICE
+    from tactileq.rig.recorder.definition import RECORDER
 
     found = asked(address, baud, (DEVICE, RECORDER))
     print(f"{address}: {found.name}{', simulated' if found.simulated else ''}")

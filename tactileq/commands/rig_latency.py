@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from modeling.errors import InputError, counted
+from tactileq.modeling.errors import InputError, counted
 from tactileq.options import RigPath, Seed
 from tactileq.printing import share_of
 
 if TYPE_CHECKING:
-    from rig.calibration.latency import LatencySummary, Part
-    from rig.calibration.trials import Watched
-    from rig.setup.rig_file import RigFile
+    from tactileq.rig.calibration.latency import LatencySummary, Part
+    from tactileq.rig.calibration.trials import Watched
+    from tactileq.rig.setup.rig_file import RigFile
 
 
 def rig_latency(
@@ -47,10 +47,10 @@ def rig_latency(
 
     Example: tactileq rig latency --rig rig.toml
     """
-    from rig.calibration.latency import check_latency, parts_of, summary_of
-    from rig.calibration.signals import usual_rms_g
-    from rig.calibration.steps import latency_figures
-    from rig.setup.rig_file import RigFile
+    from tactileq.rig.calibration.latency import check_latency, parts_of, summary_of
+    from tactileq.rig.calibration.signals import usual_rms_g
+    from tactileq.rig.calibration.steps import latency_figures
+    from tactileq.rig.setup.rig_file import RigFile
 
     loaded = RigFile.load(rig)
     if loaded.renderer is not None:
@@ -80,9 +80,9 @@ def _measured(
     """What was seen, each trial's latency, and the loop-back's."""
     from dataclasses import replace
 
-    from rig.calibration.measuring import Accelerometer
-    from rig.calibration.opening import accelerometer_input, opened_sound
-    from rig.calibration.trials import (
+    from tactileq.rig.calibration.measuring import Accelerometer
+    from tactileq.rig.calibration.opening import accelerometer_input, opened_sound
+    from tactileq.rig.calibration.trials import (
         TRIAL_STROKE_S,
         loop_back_s,
         probe_texture,
@@ -91,9 +91,9 @@ def _measured(
         watched,
         write_steps,
     )
-    from rig.desk.parts import hand_settings
-    from rig.hand.reader import HandReader
-    from rig.live.memory import Live
+    from tactileq.rig.desk.parts import hand_settings
+    from tactileq.rig.hand.reader import HandReader
+    from tactileq.rig.live.memory import Live
 
     settings = hand_settings(rig)
     if not hand:
@@ -119,7 +119,7 @@ def _measured(
             raise ValueError(faults[0])
     if not hand:
         return seen, step_latencies_s(seen), loop_s
-    from rig.calibration.latency import high_passed
+    from tactileq.rig.calibration.latency import high_passed
 
     quiet = high_passed(floor.samples_g, rate_hz=floor.rate_hz)
     delay_s = rig.hand.filter_delay_s.value
@@ -128,8 +128,8 @@ def _measured(
 
 
 def _stated_delays_s(rig: RigFile) -> dict[str, float]:
-    from modeling.rendering.plan import plan_for
-    from rig.calibration.trials import MODEL_RATE_HZ
+    from tactileq.modeling.rendering.plan import plan_for
+    from tactileq.rig.calibration.trials import MODEL_RATE_HZ
 
     plan = plan_for(MODEL_RATE_HZ, rate_hz=rig.sound.rate_hz)
     return {
@@ -144,7 +144,7 @@ def _show(
     from rich.console import Console
     from rich.table import Table
 
-    from rig.calibration.latency import AIM_MS
+    from tactileq.rig.calibration.latency import AIM_MS
 
     table = Table(box=None, pad_edge=False)
     table.add_column("ms")

@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from modeling.errors import InputError
+from tactileq.modeling.errors import InputError
 from tactileq.interruption import Interrupted
 from tactileq.options import RigPath
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from modeling.models.loading import AnyModel
-    from modeling.rendering.plan import RenderCounters
-    from rig.monitoring.bare_thread import WakeUps
-    from rig.monitoring.figures import Range, Snapshot
-    from rig.setup.rig_file import RigFile
-    from rig.sound.vibration import VibrationOutput
+    from tactileq.modeling.models.loading import AnyModel
+    from tactileq.modeling.rendering.plan import RenderCounters
+    from tactileq.rig.monitoring.bare_thread import WakeUps
+    from tactileq.rig.monitoring.figures import Range, Snapshot
+    from tactileq.rig.setup.rig_file import RigFile
+    from tactileq.rig.sound.vibration import VibrationOutput
 
 _EVERY_S = 0.1
 
@@ -45,8 +45,8 @@ def rig_monitor(
 
     Example: tactileq rig monitor models/canvas.json --rig rig.toml
     """
-    from modeling.models.loading import load_model
-    from rig.setup.rig_file import RigFile
+    from tactileq.modeling.models.loading import load_model
+    from tactileq.rig.setup.rig_file import RigFile
 
     loaded = RigFile.load(rig)
     _watch(loaded, None if model is None else load_model(model), seconds)
@@ -56,13 +56,13 @@ def _watch(rig: RigFile, model: AnyModel | None, seconds: float | None) -> None:
     """Open the rig and show it until it is ended; the last line sums up."""
     from rich.live import Live as Screen
 
-    from rig.calibration.opening import opened_sound
-    from rig.desk.parts import hand_reader
-    from rig.live.child import Child
-    from rig.live.memory import Live
-    from rig.live.messages import Done
-    from rig.monitoring.bare_thread import Look, WakeUps
-    from rig.monitoring.figures import Monitor
+    from tactileq.rig.calibration.opening import opened_sound
+    from tactileq.rig.desk.parts import hand_reader
+    from tactileq.rig.live.child import Child
+    from tactileq.rig.live.memory import Live
+    from tactileq.rig.live.messages import Done
+    from tactileq.rig.monitoring.bare_thread import Look, WakeUps
+    from tactileq.rig.monitoring.figures import Monitor
 
     rate_hz, period_s = rig.output_rate_hz, rig.output_block_s
     with (
@@ -71,7 +71,7 @@ def _watch(rig: RigFile, model: AnyModel | None, seconds: float | None) -> None:
         opened_sound(rig, live, hand=hand) as sound,
     ):
         monitor = Monitor(live, rate_hz=rate_hz, peak_g=rig.limits.peak_g.value, grid=_grid(model))
-        bare = Child("rig.monitoring.bare_thread", period_s)
+        bare = Child("tactileq.rig.monitoring.bare_thread", period_s)
         bare.ready(Done)
         if model is not None:
             sound.play(model)

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from modeling.errors import counted
+from tactileq.modeling.errors import counted
 from tactileq.options import RigPath
 
 if TYPE_CHECKING:
-    from rig.interface import PreparedSignal
-    from rig.setup.rig_file import RigFile
+    from tactileq.rig.interface import PreparedSignal
+    from tactileq.rig.setup.rig_file import RigFile
 
 
 def rig_play(
@@ -40,7 +40,7 @@ def rig_play(
 
     Example: tactileq rig play --rig rig.toml --set stimuli-set --file canvas_full_1.wav
     """
-    from rig.setup.rig_file import RigFile
+    from tactileq.rig.setup.rig_file import RigFile
 
     loaded = RigFile.load(rig)
     signal = chosen_signal(
@@ -70,8 +70,8 @@ def chosen_signal(
     ValueError
         For neither or both; another rate than the card's; another vibrator than the rig's.
     """
-    from rig.desk.stimuli import check_made_for
-    from rig.sound.signals import stimulus, tone_burst
+    from tactileq.rig.desk.stimuli import check_made_for
+    from tactileq.rig.sound.signals import stimulus, tone_burst
 
     if (tone_hz is None) == (stimuli is None) or (stimuli is None) != (which is None):
         raise ValueError(
@@ -89,9 +89,9 @@ def chosen_signal(
 
 def play(rig: RigFile, signal: PreparedSignal, *, times: int) -> None:
     """Play a signal `times` times in succession."""
-    from rig.desk.lock import rig_locked
-    from rig.desk.parts import vibration_output
-    from rig.live.memory import Live
+    from tactileq.rig.desk.lock import rig_locked
+    from tactileq.rig.desk.parts import vibration_output
+    from tactileq.rig.live.memory import Live
     from tactileq.printing import progress
 
     compensated = signal.vibrator_sha256 is not None

@@ -26,9 +26,9 @@ def rig_pose(rig: RigPath = Path("rig.toml")) -> None:
     """
     from datetime import date
 
-    from rig.calibration.pose import Touched, pose_of, touched, touching_hand
-    from rig.live.memory import Live
-    from rig.setup.rig_file import RigFile
+    from tactileq.rig.calibration.pose import Touched, pose_of, touched, touching_hand
+    from tactileq.rig.live.memory import Live
+    from tactileq.rig.setup.rig_file import RigFile
 
     loaded = RigFile.load(rig)
     with Live.create() as live, touching_hand(loaded, live):

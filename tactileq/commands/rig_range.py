@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from modeling.errors import counted
+from tactileq.modeling.errors import counted
 from tactileq.commands.record_audio import HandOptions, hand_from, opened_hand, rig_from, since_now
 from tactileq.options import AssumedForce, CountsPerMm, HandDevice, HandKind, OptionalRigPath, Out
 from tactileq.own_results import note_of_file, write_own_files
 from tactileq.printing import share_of
 
 if TYPE_CHECKING:
-    from modeling.arrays import Floats
-    from rig.capture.cutting import Readings
-    from rig.capture.exploration import Exploration
-    from rig.capture.grid import StrokeGrid
-    from rig.hand.settings import HandSettings
+    from tactileq.modeling.arrays import Floats
+    from tactileq.rig.capture.cutting import Readings
+    from tactileq.rig.capture.exploration import Exploration
+    from tactileq.rig.capture.grid import StrokeGrid
+    from tactileq.rig.hand.settings import HandSettings
 
 STEP_S = 0.1
 LONGEST_S = 600.0
@@ -45,9 +45,9 @@ def rig_range(
 
     Example: tactileq rig range --rig rig.toml --seconds 30 --out grid.toml
     """
-    from modeling.files.hashes import sha256_of_paths
-    from modeling.files.provenance import provenance_of
-    from rig.capture.exploration import explored, grid_for, grid_text
+    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.modeling.files.provenance import provenance_of
+    from tactileq.rig.capture.exploration import explored, grid_for, grid_text
 
     note = note_of_file(out, COMMAND)
     inputs = sha256_of_paths([] if rig is None else [rig])

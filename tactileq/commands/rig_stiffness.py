@@ -11,8 +11,8 @@ from tactileq.options import RigPath
 from tactileq.printing import share_of
 
 if TYPE_CHECKING:
-    from rig.calibration.stiffness import Pressed
-    from rig.setup.rig_file import RigFile
+    from tactileq.rig.calibration.stiffness import Pressed
+    from tactileq.rig.setup.rig_file import RigFile
 
 
 def rig_stiffness(
@@ -34,14 +34,14 @@ def rig_stiffness(
     """
     from datetime import date
 
-    from analysis.figures.stiffness import figure_stiffness
-    from analysis.page.saving import DOTS_PER_INCH, save_figure
-    from rig.calibration.pose import touching_hand
-    from rig.calibration.stiffness import SHARE, press_on
-    from rig.desk.walls import largest_of
-    from rig.live.memory import Live
-    from rig.setup.figures import Figure
-    from rig.setup.rig_file import RigFile
+    from tactileq.analysis.figures.stiffness import figure_stiffness
+    from tactileq.analysis.page.saving import DOTS_PER_INCH, save_figure
+    from tactileq.rig.calibration.pose import touching_hand
+    from tactileq.rig.calibration.stiffness import SHARE, press_on
+    from tactileq.rig.desk.walls import largest_of
+    from tactileq.rig.live.memory import Live
+    from tactileq.rig.setup.figures import Figure
+    from tactileq.rig.setup.rig_file import RigFile
 
     loaded = RigFile.load(rig)
     with Live.create() as live, touching_hand(loaded, live) as hand:
@@ -94,7 +94,7 @@ def rig_stiffness(
 def _ask(place: str, rig: RigFile) -> None:
     """Have the tool put there and let go; the stand-in's hand does both by itself."""
     if rig.force_device is not None and rig.force_device.simulated:
-        from rig.force.standin import StandIn, device_path
+        from tactileq.rig.force.standin import StandIn, device_path
 
         with StandIn(device_path()) as device:
             device.let_go(on_real="real" in place)

@@ -12,7 +12,7 @@ from tactileq.interruption import Interrupted
 from tactileq.options import RigPath
 
 if TYPE_CHECKING:
-    from rig.simulated.card import SimulatedCard
+    from tactileq.rig.simulated.card import SimulatedCard
 
 
 def rig_twin(
@@ -30,8 +30,8 @@ def rig_twin(
 
     Example: tactileq rig twin --rig twin.toml
     """
-    from rig.simulated.card import SimulatedCard
-    from rig.simulated.vibrator import SimulatedTransducers
+    from tactileq.rig.simulated.card import SimulatedCard
+    from tactileq.rig.simulated.vibrator import SimulatedTransducers
 
     if rig.exists():
         raise ValueError(f"expected a new rig file, got {rig}, which exists; choose another name.")
@@ -56,10 +56,10 @@ def rig_twin(
 
 def _write_rig_file(path: Path, card: SimulatedCard) -> None:
     """The shipped rig file with this card and a scripted hand."""
-    from modeling.files.writing import write_text
-    from rig.setup.figures import Figure
-    from rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
-    from rig.sound.devices import find_device
+    from tactileq.modeling.files.writing import write_text
+    from tactileq.rig.setup.figures import Figure
+    from tactileq.rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
+    from tactileq.rig.sound.devices import find_device
 
     rate_hz = find_device(card.name, "output").rate_hz
     scale = Figure(card.vibrator.sensor_fullscale_g, "g", True, "of the simulated accelerometer")

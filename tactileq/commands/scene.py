@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from modeling.errors import counted
+from tactileq.modeling.errors import counted
 from tactileq.options import Out, Seed
 from tactileq.own_results import check_own_results
 from tactileq.printing import progress, simulated_note
 
 if TYPE_CHECKING:
-    from modeling import CompiledScene, Renderer
-    from modeling.hand import Hand
-    from modeling.scenes.compiled import CompiledTexture, Measured
+    from tactileq.modeling import CompiledScene, Renderer
+    from tactileq.modeling.hand import Hand
+    from tactileq.modeling.scenes.compiled import CompiledTexture, Measured
 
 WINDOWS = 60
 TURNS = 5
@@ -49,12 +49,12 @@ def scene(
 
     Example: tactileq scene scene.toml --models models --out scene
     """
-    from modeling import Scene, compile_scene
-    from modeling.files.folders import replace_folder
-    from modeling.files.hashes import sha256_of_paths
-    from modeling.files.provenance import provenance_of, seal_folder
-    from modeling.rendering.compiled import is_compiled
-    from modeling.scenes.loading import full_models
+    from tactileq.modeling import Scene, compile_scene
+    from tactileq.modeling.files.folders import replace_folder
+    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.modeling.files.provenance import provenance_of, seal_folder
+    from tactileq.modeling.rendering.compiled import is_compiled
+    from tactileq.modeling.scenes.loading import full_models
 
     seen = check_own_results(out, "scene")
     asked = Scene.load(scene_file)
@@ -85,11 +85,11 @@ def scene(
 
 def write_scene(compiled: CompiledScene, folder: Path, *, seed: int) -> None:
     """Write the models of a compiled scene, its tables, its figure and its C header."""
-    from analysis.columns import table_bytes
-    from analysis.page.saving import picture_bytes
-    from analysis.spectra.figures.scenes import figure_tradeoff
-    from analysis.textures.scenes import before_after_table, steps_table
-    from modeling.files.writing import file_stem
+    from tactileq.analysis.columns import table_bytes
+    from tactileq.analysis.page.saving import picture_bytes
+    from tactileq.analysis.spectra.figures.scenes import figure_tradeoff
+    from tactileq.analysis.textures.scenes import before_after_table, steps_table
+    from tactileq.modeling.files.writing import file_stem
 
     compiled.save(folder)
     (folder / "before_after.tsv").write_bytes(table_bytes(before_after_table(compiled)))
@@ -104,7 +104,7 @@ def write_scene(compiled: CompiledScene, folder: Path, *, seed: int) -> None:
 
 def header_of(compiled: CompiledScene, name: str, *, seed: int) -> str:
     """All textures of a scene as one header in C, in single precision where all may be."""
-    from stimuli.exports.scene_header import scene_header
+    from tactileq.stimuli.exports.scene_header import scene_header
 
     scene = compiled.scene
     bound = ", ".join(f"{measure} {value:g}" for measure, value in scene.bound.to_dict().items())
@@ -117,8 +117,8 @@ def header_of(compiled: CompiledScene, name: str, *, seed: int) -> str:
 
 def print_texture(texture: CompiledTexture) -> None:
     """Print what a texture was reduced to, what it costs, and how close it is to the bound."""
-    from analysis.textures.scenes import driven_by
-    from modeling.scenes.cost import stored_numbers
+    from tactileq.analysis.textures.scenes import driven_by
+    from tactileq.modeling.scenes.cost import stored_numbers
 
     full, model, plan = texture.full, texture.model, texture.plan
     before, after = texture.before, texture.after
@@ -152,8 +152,8 @@ def _share(measured: Measured) -> float:
 
 def print_in_motion(texture: CompiledTexture, compiled: CompiledScene, *, seed: int) -> None:
     """Render random strokes: print the times per sample, and how often the bound is kept."""
-    from modeling import Renderer
-    from modeling.scenes.strokes import random_stroke, windows_kept
+    from tactileq.modeling import Renderer
+    from tactileq.modeling.scenes.strokes import random_stroke, windows_kept
 
     plan = texture.full_plan
     full = Renderer(texture.full, rate_hz=plan.rate_hz, update_samples=plan.update_samples)

@@ -7,24 +7,24 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from modeling.errors import InputError, shown
+from tactileq.modeling.errors import InputError, shown
 
 if TYPE_CHECKING:
-    from modeling.files.described import FileSection
+    from tactileq.modeling.files.described import FileSection
 
 # Each kind of file, and where it is declared.
 DECLARED = {
-    "scene": "modeling.scenes.scene:SceneFile",
-    "recipe": "stimuli.sets.recipe:Recipe",
-    "study": "experiments.study.study:Study",
-    "rig": "rig.setup.rig_file:RigFile",
-    "recorder": "rig.recorder.recorder_file:RecorderFile",
-    "model": "modeling.models.texture_model:TextureModel",
-    "regressed-model": "modeling.models.regressed_model:RegressedModel",
-    "ar-model": "modeling.models.ar_model:ARModel",
-    "simplification": "modeling.perception.verdicts:Simplification",
-    "vibrator": "modeling.vibrators.vibrator:Vibrator",
-    "session": "experiments.sessions.manifest:SessionManifest",
+    "scene": "tactileq.modeling.scenes.scene:SceneFile",
+    "recipe": "tactileq.stimuli.sets.recipe:Recipe",
+    "study": "tactileq.experiments.study.study:Study",
+    "rig": "tactileq.rig.setup.rig_file:RigFile",
+    "recorder": "tactileq.rig.recorder.recorder_file:RecorderFile",
+    "model": "tactileq.modeling.models.texture_model:TextureModel",
+    "regressed-model": "tactileq.modeling.models.regressed_model:RegressedModel",
+    "ar-model": "tactileq.modeling.models.ar_model:ARModel",
+    "simplification": "tactileq.modeling.perception.verdicts:Simplification",
+    "vibrator": "tactileq.modeling.vibrators.vibrator:Vibrator",
+    "session": "tactileq.experiments.sessions.manifest:SessionManifest",
 }
 
 
@@ -38,7 +38,7 @@ def schema(
 
     Example: tactileq schema scene > scene.schema.json
     """
-    from modeling.files.describing import schema_text
+    from tactileq.modeling.files.describing import schema_text
 
     print(schema_text(declared(name)), end="")
 

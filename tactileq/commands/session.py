@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from modeling.errors import counted
-from modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.errors import counted
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
 from tactileq.options import Data, Models, SceneModels, Simplified, StudyFile
 from tactileq.printing import print_foreign_models, share_of
 
 if TYPE_CHECKING:
     TaskName = str
-    from experiments.console.console import Console
-    from experiments.study.models import ModelSets
-    from experiments.study.study import Study
-    from rig.desk.walls import Walls
-    from rig.interface import TextureRig
-    from rig.setup.rig_file import RigFile
+    from tactileq.experiments.console.console import Console
+    from tactileq.experiments.study.models import ModelSets
+    from tactileq.experiments.study.study import Study
+    from tactileq.rig.desk.walls import Walls
+    from tactileq.rig.interface import TextureRig
+    from tactileq.rig.setup.rig_file import RigFile
 else:
     TaskName = Literal[tuple(ANSWER_TABLES)]
 
@@ -68,14 +68,14 @@ def session(
 
     Example: tactileq session --task absolute --subject 1 --rig rig.toml --data data
     """
-    from experiments.console.languages import require_texts
-    from experiments.sessions.bids import export_session
-    from experiments.sessions.log import SEAL_WRITTEN
-    from experiments.sessions.overrides import Overrides
-    from experiments.sessions.running import Circumstances, run_session
-    from experiments.sessions.trial_loop import People
-    from experiments.study.study import Study
-    from experiments.tasks import task_named
+    from tactileq.experiments.console.languages import require_texts
+    from tactileq.experiments.sessions.bids import export_session
+    from tactileq.experiments.sessions.log import SEAL_WRITTEN
+    from tactileq.experiments.sessions.overrides import Overrides
+    from tactileq.experiments.sessions.running import Circumstances, run_session
+    from tactileq.experiments.sessions.trial_loop import People
+    from tactileq.experiments.study.study import Study
+    from tactileq.experiments.tasks import task_named
     from tactileq.experimenter import Terminal
 
     plan = Study.load(study)
@@ -128,8 +128,8 @@ def session(
 
 def _language_of(data: Path, *, task: str, subject: int, session: int) -> str:
     """The language in which a session began; empty where there is none yet."""
-    from experiments.sessions.files import SessionFiles
-    from experiments.sessions.manifest import SessionManifest
+    from tactileq.experiments.sessions.files import SessionFiles
+    from tactileq.experiments.sessions.manifest import SessionManifest
 
     files = SessionFiles(root=data, task=task, subject=subject, session=session)
     return SessionManifest.load(files.manifest).language if files.manifest.exists() else ""
@@ -154,11 +154,11 @@ def rig_of(plan: Study, sets: ModelSets, *, rig: Path | None, override: str | No
     InputError
         For an invalid rig file, and for a rig that does not meet the study's requirements.
     """
-    from rig.desk.checks import Requirements, check_models
-    from rig.desk.desk_rig import DeskRig
-    from rig.interface import Stimulus
-    from rig.setup.rig_file import RigFile
-    from rig.twin import SimulatedRig
+    from tactileq.rig.desk.checks import Requirements, check_models
+    from tactileq.rig.desk.desk_rig import DeskRig
+    from tactileq.rig.interface import Stimulus
+    from tactileq.rig.setup.rig_file import RigFile
+    from tactileq.rig.twin import SimulatedRig
 
     every = [sets.of(texture, name) for name in sets.names for texture in plan.textures]
     if rig is None:
@@ -174,7 +174,7 @@ def rig_of(plan: Study, sets: ModelSets, *, rig: Path | None, override: str | No
 
 def walls_of(plan: Study, rig: RigFile) -> Walls | None:
     """What a force device renders; None for a rig and a study without one."""
-    from rig.desk.walls import Walls, usual_wall
+    from tactileq.rig.desk.walls import Walls, usual_wall
 
     if plan.wall is None:
         return None
@@ -194,8 +194,8 @@ def models_of_study(
 
     `models` replaces the study's first set, `simplified` or `scene` its second one.
     """
-    from experiments.study.models import load_model_sets
-    from modeling.scenes.compiled import FILE as SCENE
+    from tactileq.experiments.study.models import load_model_sets
+    from tactileq.modeling.scenes.compiled import FILE as SCENE
 
     if simplified is not None and scene is not None:
         raise ValueError(
@@ -223,7 +223,7 @@ def open_console(
     plan: Study, *, language: str, stamp: str, fullscreen: bool, screen: int
 ) -> Console:
     """The console's window in the participant's language."""
-    from experiments.console.console import Console
+    from tactileq.experiments.console.console import Console
 
     return Console(
         language=language or plan.languages[0], stamp=stamp, fullscreen=fullscreen, screen=screen
@@ -249,8 +249,8 @@ def print_timings(
     from rich.console import Console as Paper
     from rich.table import Table
 
-    from experiments.console.selftest import time_flips, time_presentations, time_syncs
-    from modeling import InputError
+    from tactileq.experiments.console.selftest import time_flips, time_presentations, time_syncs
+    from tactileq.modeling import InputError
 
     models = [sets.of(texture, name) for name in sets.names for texture in plan.textures]
     timings = [

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from modeling.errors import counted
+from tactileq.modeling.errors import counted
 from tactileq.many_textures import recording_folders
 from tactileq.options import Criterion, HoldAbove, Margin, ModelFile, ThresholdName
 from tactileq.own_results import check_own_files, write_own_files
 from tactileq.printing import simulated_note, usable_recordings
 
 if TYPE_CHECKING:
-    from modeling import RecordingSet, Simplification, TextureModel
+    from tactileq.modeling import RecordingSet, Simplification, TextureModel
 
 # Of the names of all files that the command may write, beside their provenance.
 ENDINGS = (".json", "_simplification.json", "_layers.tsv", "_threshold.png")
@@ -52,13 +52,13 @@ def simplify(
 
     Example: tactileq simplify models/canvas.json --threshold pen-hold --margin-db 3 --plot
     """
-    from analysis.columns import table_bytes
-    from analysis.textures.results import simplification_table
-    from modeling import TextureModel, Threshold
-    from modeling import simplify as drop_layers
-    from modeling.files.hashes import sha256_of_paths
-    from modeling.files.provenance import provenance_of
-    from modeling.files.writing import file_stem
+    from tactileq.analysis.columns import table_bytes
+    from tactileq.analysis.textures.results import simplification_table
+    from tactileq.modeling import TextureModel, Threshold
+    from tactileq.modeling import simplify as drop_layers
+    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.modeling.files.provenance import provenance_of
+    from tactileq.modeling.files.writing import file_stem
 
     inputs = sha256_of_paths([model_file])
     full = TextureModel.load(model_file)
@@ -139,10 +139,10 @@ def draw_condition(
     Returns a PNG file. Without speed (mm/s) or force (N) it is the fastest and strongest
     condition, of the recordings if there are any, else of the grid.
     """
-    from analysis.page.saving import picture_bytes
-    from analysis.spectra.comparison import compare_condition, compare_spectra
-    from analysis.spectra.figures.spectra import figure_spectra_and_threshold
-    from analysis.textures.results import TextureResult, reference_condition
+    from tactileq.analysis.page.saving import picture_bytes
+    from tactileq.analysis.spectra.comparison import compare_condition, compare_spectra
+    from tactileq.analysis.spectra.figures.spectra import figure_spectra_and_threshold
+    from tactileq.analysis.textures.results import TextureResult, reference_condition
 
     if recordings is None:
         fastest, strongest = float(full.speeds_mm_s[-1]), float(full.forces_n[-1])
@@ -160,7 +160,7 @@ def draw_condition(
 
 def _recordings_of(texture: str, folder: Path) -> RecordingSet:
     """The recordings of one texture in a folder, or in the sub-folder that holds them."""
-    from modeling.recordings.recording_set import textures_in
+    from tactileq.modeling.recordings.recording_set import textures_in
 
     for found in recording_folders(folder):
         if texture in textures_in(found):

@@ -19,11 +19,11 @@ from tactileq.options import (
 from tactileq.printing import print_models, progress
 
 if TYPE_CHECKING:
-    from experiments.observers.psychometrics import Psychometrics
-    from experiments.study.models import ModelSets
-    from experiments.study.study import Study
-    from modeling import TextureModel, Threshold
-    from rig.interface import TextureRig
+    from tactileq.experiments.observers.psychometrics import Psychometrics
+    from tactileq.experiments.study.models import ModelSets
+    from tactileq.experiments.study.study import Study
+    from tactileq.modeling import TextureModel, Threshold
+    from tactileq.rig.interface import TextureRig
 
 
 def simulate(
@@ -41,11 +41,11 @@ def simulate(
 
     Example: tactileq simulate --models models --simplified simplified --data data
     """
-    from experiments.study.study import Study
-    from modeling import Threshold
-    from modeling.files.hashes import sha256_of_paths
-    from modeling.files.provenance import write_provenance
-    from stimuli.planted.textures import TEXTURES, planted_texture
+    from tactileq.experiments.study.study import Study
+    from tactileq.modeling import Threshold
+    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.modeling.files.provenance import write_provenance
+    from tactileq.stimuli.planted.textures import TEXTURES, planted_texture
 
     plan = Study.load(study)
     if unknown := [name for name in plan.textures if name not in TEXTURES]:
@@ -89,7 +89,7 @@ def _scene_settings(sets: ModelSets) -> dict[str, object]:
 
 def _read_for(place: Path) -> tuple[Path, ...]:
     """What was read for a set of models: a folder, or a scene file and all that it names."""
-    from modeling.scenes.loading import scene_files
+    from tactileq.modeling.scenes.loading import scene_files
 
     return (place,) if place.is_dir() else scene_files(place)
 
@@ -107,8 +107,8 @@ def run_study(
     rig: TextureRig | None = None,
 ) -> None:
     """Simulate all participants of a study with a progress bar, by default at `SimulatedRig`."""
-    from experiments.observers.whole_study import simulate_study
-    from rig.twin import SimulatedRig
+    from tactileq.experiments.observers.whole_study import simulate_study
+    from tactileq.rig.twin import SimulatedRig
 
     print_models(models, plan.textures)
     sessions = sum(task.participants * plan.sessions(name) for name, task in plan.tasks.items())

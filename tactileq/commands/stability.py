@@ -17,9 +17,9 @@ from tactileq.workers import working
 if TYPE_CHECKING:
     import pandas as pd
 
-    from benches.atlas.case import Case
-    from benches.atlas.edges import Examined
-    from modeling.files.folders import Contents
+    from tactileq.benches.atlas.case import Case
+    from tactileq.benches.atlas.edges import Examined
+    from tactileq.modeling.files.folders import Contents
 
 
 def stability(
@@ -45,8 +45,8 @@ def stability(
 
     Example: tactileq stability --only filters
     """
-    from benches.atlas.cases import CASES
-    from benches.atlas.edges import columns_of
+    from tactileq.benches.atlas.cases import CASES
+    from tactileq.benches.atlas.edges import columns_of
 
     seen = check_own_results(out, "stability")
     chosen = cases_of(CASES, only)
@@ -92,7 +92,7 @@ def examined(
     advance : callable, optional
         Called with the name of each column that is done.
     """
-    from benches.atlas.edges import columns_of, examine_column
+    from tactileq.benches.atlas.edges import columns_of, examine_column
 
     found: dict[int, Examined] = {}
     columns = columns_of(cases, full=full)
@@ -106,10 +106,10 @@ def examined(
 def _write(
     found: Sequence[Examined], out: Path, *, seen: Contents, settings: dict[str, object]
 ) -> None:
-    from benches.atlas.section import atlas_files
-    from benches.atlas.tables import margin_table
-    from modeling.files.folders import replace_folder
-    from modeling.files.provenance import provenance_of, seal_folder
+    from tactileq.benches.atlas.section import atlas_files
+    from tactileq.benches.atlas.tables import margin_table
+    from tactileq.modeling.files.folders import replace_folder
+    from tactileq.modeling.files.provenance import provenance_of, seal_folder
 
     provenance = provenance_of("stability", settings)
     with replace_folder(out, seen) as fresh:

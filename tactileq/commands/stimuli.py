@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from modeling.errors import counted
+from tactileq.modeling.errors import counted
 from tactileq.options import Out, VibratorFile
 from tactileq.printing import progress
 
 if TYPE_CHECKING:
-    from stimuli.sets.recipe import Recipe
-    from stimuli.sets.sources import Sources
+    from tactileq.stimuli.sets.recipe import Recipe
+    from tactileq.stimuli.sets.sources import Sources
 
 
 def stimuli(
@@ -83,8 +83,8 @@ def recipe_from(
     vibrator: Path | None,
 ) -> Recipe:
     """The recipe of this file, or the one that model files and options make."""
-    from modeling.models.loading import models_among
-    from stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
+    from tactileq.modeling.models.loading import models_among
+    from tactileq.stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
 
     recipes = [path for path in named if path.suffix.lower() == ".toml"]
     options = {rate_hz, duration_s, seed, vibrator}
@@ -122,9 +122,9 @@ def print_passed_over(others: Sequence[Path]) -> None:
 
 def render_stimuli(recipe: Recipe, out: Path, *, inputs: Sequence[Path] = ()) -> None:
     """Write a stimulus set with its contact sheet and provenance; report what exceeds the grid."""
-    from modeling.files.hashes import sha256_of_paths
-    from modeling.files.provenance import write_provenance
-    from stimuli.sets.sources import files_behind
+    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.modeling.files.provenance import write_provenance
+    from tactileq.stimuli.sets.sources import files_behind
 
     hashes = sha256_of_paths([*inputs, *files_behind(recipe)])
 
@@ -147,16 +147,16 @@ def render_set(
 
     Returns what it was rendered from and how many files it has.
     """
-    from stimuli.sets.sources import load_sources
-    from stimuli.sets.writing import CONTACT_SHEET, check_place, stimulus_count, write_set
+    from tactileq.stimuli.sets.sources import load_sources
+    from tactileq.stimuli.sets.writing import CONTACT_SHEET, check_place, stimulus_count, write_set
 
     # Wrong input is refused before there is a bar, and before what draws is loaded.
     check_place(out)
     sources = load_sources(recipe)
     count = stimulus_count(recipe, sources)
-    from analysis.page.saving import DOTS_PER_INCH, save_figure
-    from analysis.spectra.contact_sheet import contact_sheet
-    from analysis.spectra.figures.stimuli import figure_contact_sheet
+    from tactileq.analysis.page.saving import DOTS_PER_INCH, save_figure
+    from tactileq.analysis.spectra.contact_sheet import contact_sheet
+    from tactileq.analysis.spectra.figures.stimuli import figure_contact_sheet
 
     def draw(folder: Path) -> None:
         sheet = figure_contact_sheet(contact_sheet(folder))

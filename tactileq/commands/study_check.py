@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from modeling.errors import counted
+from tactileq.modeling.errors import counted
 from tactileq.options import StudyArgument
 from tactileq.printing import print_models, share_of
 
 if TYPE_CHECKING:
-    from experiments.study.models import ModelSets
-    from experiments.study.study import Study
+    from tactileq.experiments.study.models import ModelSets
+    from tactileq.experiments.study.study import Study
 
 
 def study_check(path: StudyArgument) -> None:
@@ -38,9 +38,9 @@ def loaded(path: Path) -> tuple[Study, ModelSets, list[Path]]:
     InputError
         For a study or models that cannot be used.
     """
-    from experiments.console.languages import require_texts
-    from experiments.study.models import load_model_sets
-    from experiments.study.study import Study
+    from tactileq.experiments.console.languages import require_texts
+    from tactileq.experiments.study.models import load_model_sets
+    from tactileq.experiments.study.study import Study
 
     plan = Study.load(path)
     require_texts(plan)
@@ -54,7 +54,7 @@ def loaded(path: Path) -> tuple[Study, ModelSets, list[Path]]:
 
 
 def _print_claims(plan: Study) -> None:
-    from experiments.tasks.page import proof_of_sensitivity
+    from tactileq.experiments.tasks.page import proof_of_sensitivity
 
     claims = plan.plan.claims
     sentence = "none; all findings are exploratory"
@@ -66,8 +66,8 @@ def _print_claims(plan: Study) -> None:
 
 
 def _print_sessions(plan: Study) -> None:
-    from experiments.tasks.durations import minutes_of_session, trials_of_session
-    from experiments.tasks.page import catch_trials_text
+    from tactileq.experiments.tasks.durations import minutes_of_session, trials_of_session
+    from tactileq.experiments.tasks.page import catch_trials_text
 
     for task, planned in plan.tasks.items():
         training, main = trials_of_session(plan, task)
@@ -82,7 +82,7 @@ def _print_sessions(plan: Study) -> None:
 
 
 def _print_balance(plan: Study) -> None:
-    from experiments.tasks.balance import balance_of
+    from tactileq.experiments.tasks.balance import balance_of
 
     print("balance of the orders (lowest to highest count, of the total):")
     for row in (row for task in plan.tasks for row in balance_of(plan, task)):

@@ -39,9 +39,9 @@ def study_init(
 
     Example: tactileq study init study.toml --models models --simplified simplified
     """
-    from experiments.study.study import SHIPPED_STUDY, Study
-    from modeling.files.describing import schema_text
-    from modeling.files.writing import write_text
+    from tactileq.experiments.study.study import SHIPPED_STUDY, Study
+    from tactileq.modeling.files.describing import schema_text
+    from tactileq.modeling.files.writing import write_text
 
     if os.path.lexists(path):
         raise ValueError(
@@ -84,7 +84,7 @@ def study_init(
 
 def _check_schema(path: Path, described: str) -> None:
     """Refuse to replace another file than the schema that would be written."""
-    from modeling.files.reading import read_text
+    from tactileq.modeling.files.reading import read_text
 
     if os.path.lexists(path) and read_text(path, "a schema of study files") != described:
         raise ValueError(
@@ -95,7 +95,7 @@ def _check_schema(path: Path, described: str) -> None:
 
 def _textures_in(folders: Sequence[Path]) -> list[str]:
     """The textures of the first folder, which must also be in the other one."""
-    from modeling.models.loading import load_any_models
+    from tactileq.modeling.models.loading import load_any_models
 
     full, simplified = (sorted(load_any_models(folder)) for folder in folders)
     if missing := [name for name in full if name not in simplified]:
@@ -111,9 +111,9 @@ def _study_with_models(
     text: str, textures: Sequence[str], folders: Sequence[Path], *, beside: Path, seed: int
 ) -> str:
     """The shipped study with these textures: models, trays, and no pairs of others."""
-    from experiments.study.design import fisher_yates
-    from experiments.study.study import Study
-    from modeling.seeds import generator
+    from tactileq.experiments.study.design import fisher_yates
+    from tactileq.experiments.study.study import Study
+    from tactileq.modeling.seeds import generator
 
     full, simplified = (_as_toml(os.path.relpath(folder, beside)) for folder in folders)
     trays = fisher_yates(ascii_uppercase[: len(textures)], generator(seed))

@@ -24,10 +24,10 @@ def study_plan(
 
     Example: tactileq study plan study.toml --out plan.md
     """
-    from experiments.study.study import plan_sha256
-    from experiments.tasks.page import plan_page
-    from modeling.files.hashes import sha256_of_paths
-    from modeling.files.provenance import provenance_of
+    from tactileq.experiments.study.study import plan_sha256
+    from tactileq.experiments.tasks.page import plan_page
+    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.modeling.files.provenance import provenance_of
 
     if out.suffix.lower() != ".md":
         raise ValueError(f"expected a name that ends in .md, got {out}; rename it.")

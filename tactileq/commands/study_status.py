@@ -6,14 +6,14 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from modeling.errors import counted
+from tactileq.modeling.errors import counted
 from tactileq.options import Data, StudyFile
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from experiments.sessions.bids import Exported
-    from experiments.sessions.status import PersonProgress, StudyProgress
+    from tactileq.experiments.sessions.bids import Exported
+    from tactileq.experiments.sessions.status import PersonProgress, StudyProgress
 
 
 def study_status(data: Data = Path("data"), study: StudyFile = None) -> None:
@@ -26,9 +26,9 @@ def study_status(data: Data = Path("data"), study: StudyFile = None) -> None:
     """
     from rich.console import Console
 
-    from experiments.sessions.bids import export_all
-    from experiments.sessions.status import study_progress
-    from experiments.study.study import Study
+    from tactileq.experiments.sessions.bids import export_all
+    from tactileq.experiments.sessions.status import study_progress
+    from tactileq.experiments.study.study import Study
 
     progress = study_progress(data, None if study is None else Study.load(study))
     made = export_all(data)

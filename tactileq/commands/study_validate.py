@@ -18,8 +18,8 @@ def study_validate(
 
     Example: tactileq study validate data
     """
-    from experiments.sessions.files import require_data_folder
-    from modeling.errors import counted
+    from tactileq.experiments.sessions.files import require_data_folder
+    from tactileq.modeling.errors import counted
     from tactileq.bids_validator import bids_issues, said_of
 
     require_data_folder(data)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from modeling.errors import counted
+from tactileq.modeling.errors import counted
 from tactileq.commands.study_status import print_made
 from tactileq.options import Data
 
@@ -26,7 +26,7 @@ def study_withdraw(
 
     Example: tactileq study withdraw 7 --data data
     """
-    from experiments.sessions.withdrawing import files_of, withdraw
+    from tactileq.experiments.sessions.withdrawing import files_of, withdraw
 
     _require(data, study)
     files = counted(len(files_of(data, subject)), "file")
@@ -44,7 +44,7 @@ def study_dropout(
 
     Example: tactileq study dropout 7 --data data
     """
-    from experiments.sessions.withdrawing import drop_out
+    from tactileq.experiments.sessions.withdrawing import drop_out
 
     _require(data, study)
     _confirm(f"Give the slot of subject {subject} to somebody else?", yes=yes)
@@ -55,8 +55,8 @@ def study_dropout(
 
 def _require(data: Path, study: Path | None) -> None:
     """Refuse the data of another study than the one that is named."""
-    from experiments.sessions.data_set import require_study
-    from experiments.study.study import Study
+    from tactileq.experiments.sessions.data_set import require_study
+    from tactileq.experiments.study.study import Study
 
     if study is not None:
         require_study(data, Study.load(study))

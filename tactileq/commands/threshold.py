@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from modeling.errors import counted
+from tactileq.modeling.errors import counted
 from tactileq.options import Data
 from tactileq.own_results import note_of_file, write_own_files
 
@@ -31,15 +31,15 @@ def threshold(
     Example: tactileq threshold --data data --subject 1 --out mine.tsv, then tactileq simplify
     models/canvas.json --threshold mine.tsv
     """
-    from experiments.sessions.bids import require_tables
-    from experiments.tasks.threshold_table import (
+    from tactileq.experiments.sessions.bids import require_tables
+    from tactileq.experiments.tasks.threshold_table import (
         answer_files,
         mean_thresholds,
         read_answers,
         threshold_text,
     )
-    from modeling.files.hashes import sha256_of_paths
-    from modeling.files.provenance import provenance_of
+    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.modeling.files.provenance import provenance_of
 
     if out.suffix != ".tsv":
         raise ValueError(f"expected a file that ends with .tsv, got {out}; rename it.")

@@ -27,7 +27,7 @@ def verify(
 
     Example: tactileq verify data analysis-results
     """
-    from experiments.verification.verifying import verify_data
+    from tactileq.experiments.verification.verifying import verify_data
     from tactileq.archive import DATA, REPORT, is_archive
     from tactileq.commands.analyze import analyze
     from tactileq.verification import print_data_differences, print_differences

@@ -10,7 +10,7 @@ import typer
 from tactileq.own_results import note_of_file, write_own_files
 
 if TYPE_CHECKING:
-    from analysis.spectra.vibrator import CompensatedVibrator
+    from tactileq.analysis.spectra.vibrator import CompensatedVibrator
 
 
 def vibrator(
@@ -54,13 +54,13 @@ def identify_from(test: Path, out: Path, *, plot: Path | None, simulated: bool) 
     simulated : bool
         Whether the test was simulated.
     """
-    from analysis.page.saving import picture_bytes
-    from analysis.spectra.figures.vibrator import figure_vibrator
-    from analysis.spectra.vibrator import compensated
-    from modeling import identify_vibrator
-    from modeling.files.hashes import sha256_of_paths
-    from modeling.files.provenance import provenance_of
-    from modeling.files.wav import read_wav_channels
+    from tactileq.analysis.page.saving import picture_bytes
+    from tactileq.analysis.spectra.figures.vibrator import figure_vibrator
+    from tactileq.analysis.spectra.vibrator import compensated
+    from tactileq.modeling import identify_vibrator
+    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.modeling.files.provenance import provenance_of
+    from tactileq.modeling.files.wav import read_wav_channels
 
     files = {path: ending for path, ending in ((out, ".json"), (plot, ".png")) if path is not None}
     for path, ending in files.items():

@@ -12,17 +12,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.answers.plan import AnalysisPlan, Claim
-from analysis.answers.responses import Responses
-from analysis.chapters.chapter import Answered
-from analysis.labels import ALL_TEXTURES, SCALES
-from analysis.page.sections import Headline
-from analysis.statistics.claims import with_people
-from analysis.statistics.participants.verdict import PeopleFound, PeopleSummary
-from analysis.statistics.verdicts import ClaimFound, claims_found
-from analysis.textures.results import TextureResult
-from modeling import TextureModel, Threshold, fit_texture, simplify
-from stimuli.planted.textures import planted_texture, record_texture
+from tactileq.analysis.answers.plan import AnalysisPlan, Claim
+from tactileq.analysis.answers.responses import Responses
+from tactileq.analysis.chapters.chapter import Answered
+from tactileq.analysis.labels import ALL_TEXTURES, SCALES
+from tactileq.analysis.page.sections import Headline
+from tactileq.analysis.statistics.claims import with_people
+from tactileq.analysis.statistics.participants.verdict import PeopleFound, PeopleSummary
+from tactileq.analysis.statistics.verdicts import ClaimFound, claims_found
+from tactileq.analysis.textures.results import TextureResult
+from tactileq.modeling import TextureModel, Threshold, fit_texture, simplify
+from tactileq.stimuli.planted.textures import planted_texture, record_texture
 
 TEXTURES = ("aluminum", "canvas", "leather", "MDF", "polyester", "PVC", "wall paper")
 ABSOLUTE = (
@@ -366,9 +366,9 @@ def truth() -> TextureModel:
 def few_draws() -> Iterator[None]:
     """No test of a report hangs on p values of more than a thousand draws."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("analysis.chapters.confusions.similarity_choice.SIMULATIONS", 19)
-        patch.setattr("analysis.statistics.paired.RESAMPLES", 999)
-        patch.setattr("analysis.statistics.rates.BOOTSTRAP_RESAMPLES", 500)
+        patch.setattr("tactileq.analysis.chapters.confusions.similarity_choice.SIMULATIONS", 19)
+        patch.setattr("tactileq.analysis.statistics.paired.RESAMPLES", 999)
+        patch.setattr("tactileq.analysis.statistics.rates.BOOTSTRAP_RESAMPLES", 500)
         yield
 
 

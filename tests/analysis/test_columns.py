@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.columns import LAYER, TEXTURE
-from analysis.labels import ALL_LAYERS, ALL_TEXTURES
-from modeling.files.columns import Column, chosen, names, p_value, without
+from tactileq.analysis.columns import LAYER, TEXTURE
+from tactileq.analysis.labels import ALL_LAYERS, ALL_TEXTURES
+from tactileq.modeling.files.columns import Column, chosen, names, p_value, without
 from tests.refusals import refused
 
 PLAIN, P, EXACT = Column("x"), Column("p", is_p_value=True), Column("gfc", format=".4f")

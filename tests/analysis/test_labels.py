@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.labels import significance_mark
+from tactileq.analysis.labels import significance_mark
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pingouin import power_ttest
 from scipy import stats
 
-from benches.raters import (
+from tactileq.benches.raters import (
     HIGHEST,
     LOWEST,
     at_random,

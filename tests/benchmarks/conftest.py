@@ -9,9 +9,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from modeling import Recording, RecordingSet
-from modeling.threads import one_linear_algebra_thread
-from stimuli.planted.textures import (
+from tactileq.modeling import Recording, RecordingSet
+from tactileq.modeling.threads import one_linear_algebra_thread
+from tactileq.stimuli.planted.textures import (
     FORCES_N,
     RECORDER_RATE_HZ,
     SPEEDS_MM_S,

@@ -14,12 +14,12 @@ from typing import Any
 
 import pytest
 
-from modeling import InputError
-from rig.force.hand import ForceHand
-from rig.force.standin import StandIn
-from rig.force.states import State
-from rig.live.clock import now_s
-from rig.live.memory import Live
+from tactileq.modeling import InputError
+from tactileq.rig.force.hand import ForceHand
+from tactileq.rig.force.standin import StandIn
+from tactileq.rig.force.states import State
+from tactileq.rig.live.clock import now_s
+from tactileq.rig.live.memory import Live
 from tests.rig.force.rig_files import standing_in
 from tests.rig.force.test_processes import WALL, opened, size_n
 

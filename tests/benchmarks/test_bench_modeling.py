@@ -11,8 +11,8 @@ from joblib import Parallel, cpu_count, delayed
 from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.signal import resample, resample_poly
 
-from analysis.spectra.findings import find_in
-from modeling import (
+from tactileq.analysis.spectra.findings import find_in
+from tactileq.modeling import (
     ESTIMATORS,
     Recording,
     RecordingSet,
@@ -22,9 +22,9 @@ from modeling import (
     regressed,
     spectrum,
 )
-from modeling.fitting.autoregressive import fit_filter
-from modeling.recordings.spectrum import MODEL_RATE_HZ
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling.fitting.autoregressive import fit_filter
+from tactileq.modeling.recordings.spectrum import MODEL_RATE_HZ
+from tactileq.stimuli.planted.textures import planted_texture
 from tactileq.many_textures import HowToModel, model_textures
 
 RECORDER_RATE_HZ = 22704.0

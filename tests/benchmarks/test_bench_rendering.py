@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from modeling import Renderer, TextureModel, render_many
-from modeling.arrays import Floats
-from modeling.hand import Hand
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import Renderer, TextureModel, render_many
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.hand import Hand
+from tactileq.stimuli.planted.textures import planted_texture
 
 STREAMS = 64
 SECONDS = 2

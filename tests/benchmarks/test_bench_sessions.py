@@ -9,15 +9,15 @@ from pathlib import Path
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from experiments.observers.in_memory import simulate_sessions
-from experiments.observers.percepts import Perception
-from experiments.observers.psychometrics import Psychometrics
-from experiments.observers.whole_study import simulate_study
-from experiments.study.models import ModelSets
-from experiments.study.study import Study
-from modeling import TextureModel, Threshold, simplify
-from rig.twin import SimulatedRig
-from stimuli.planted.textures import planted_texture
+from tactileq.experiments.observers.in_memory import simulate_sessions
+from tactileq.experiments.observers.percepts import Perception
+from tactileq.experiments.observers.psychometrics import Psychometrics
+from tactileq.experiments.observers.whole_study import simulate_study
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.study import Study
+from tactileq.modeling import TextureModel, Threshold, simplify
+from tactileq.rig.twin import SimulatedRig
+from tactileq.stimuli.planted.textures import planted_texture
 
 WAYS = ("in memory", "with every answer on disk")
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from modeling import simplify
-from modeling.perception.thresholds import Threshold
-from stimuli.planted.textures import TEXTURES, planted_texture
-from stimuli.sets import rendering, writing
-from stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
-from stimuli.sets.sources import load_sources
+from tactileq.modeling import simplify
+from tactileq.modeling.perception.thresholds import Threshold
+from tactileq.stimuli.planted.textures import TEXTURES, planted_texture
+from tactileq.stimuli.sets import rendering, writing
+from tactileq.stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
+from tactileq.stimuli.sets.sources import load_sources
 
 # A recorded hand ends when it ends, not after a round number of samples.
 HANDS_S = (1.8702, 2.3174)

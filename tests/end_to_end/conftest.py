@@ -12,14 +12,14 @@ from typing import Any
 import pytest
 import typer
 
-from experiments.observers.whole_study import simulate_study
-from experiments.study.models import ModelSets
-from experiments.study.study import Study
-from experiments.study.task_plan import TaskPlan
-from modeling import Threshold, simplify
-from modeling.files.claims import ClaimSection, PlanSection
-from rig.twin import SimulatedRig
-from stimuli.planted.textures import planted_texture
+from tactileq.experiments.observers.whole_study import simulate_study
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.study.task_plan import TaskPlan
+from tactileq.modeling import Threshold, simplify
+from tactileq.modeling.files.claims import ClaimSection, PlanSection
+from tactileq.rig.twin import SimulatedRig
+from tactileq.stimuli.planted.textures import planted_texture
 from tactileq import app
 
 SMALL_STUDY = """

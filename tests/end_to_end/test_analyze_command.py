@@ -11,15 +11,15 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from analysis.answers import loading
-from modeling.files.hashes import sha256_of_file, sha256_of_paths
+from tactileq.analysis.answers import loading
+from tactileq.modeling.files.hashes import sha256_of_file, sha256_of_paths
 from tactileq.commands.analyze import _later_plan, read_answers
 
 
 @pytest.fixture(autouse=True)
 def quick(undrawn: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports without pictures, and with fewer simulated tables, of which no test here is."""
-    monkeypatch.setattr("analysis.chapters.confusions.similarity_choice.SIMULATIONS", 9)
+    monkeypatch.setattr("tactileq.analysis.chapters.confusions.similarity_choice.SIMULATIONS", 9)
 
 
 LATER = """

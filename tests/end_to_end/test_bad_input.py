@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modeling import InputError, Recording, RecordingSet
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import InputError, Recording, RecordingSet
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.refusals import check_refusal, refused
 
 NOISE = np.random.default_rng(3).normal(0, 0.1, 3000)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from stimuli.planted.drawn import draw_surface
+from tactileq.stimuli.planted.drawn import draw_surface
 
 METHODS = ("--method", "AR(6)", "--method", "joint, 1 layer", "--method", "white noise")
 CONTENTS = {

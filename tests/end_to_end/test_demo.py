@@ -9,11 +9,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from experiments import Study
-from modeling import RecordingSet, TextureModel
-from modeling.models.loading import models_in
-from modeling.perception.verdicts import load_simplifications
-from stimuli.planted.textures import TEXTURES
+from tactileq.experiments import Study
+from tactileq.modeling import RecordingSet, TextureModel
+from tactileq.modeling.models.loading import models_in
+from tactileq.modeling.perception.verdicts import load_simplifications
+from tactileq.stimuli.planted.textures import TEXTURES
 
 RATINGS = ["magnitude_similarity", "frequency_similarity"]
 

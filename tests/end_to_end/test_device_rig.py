@@ -13,10 +13,10 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from experiments.sessions.log import read_log
-from experiments.verification.verifying import verify_data
-from rig.device.emulating import Emulator
-from stimuli.planted.textures import planted_texture
+from tactileq.experiments.sessions.log import read_log
+from tactileq.experiments.verification.verifying import verify_data
+from tactileq.rig.device.emulating import Emulator
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.end_to_end.test_force_rig import press_down
 from tests.end_to_end.test_session_on_a_rig import (
     STUDY,

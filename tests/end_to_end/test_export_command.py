@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import soundfile
 
-from modeling import Renderer
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import Renderer
+from tactileq.stimuli.planted.textures import planted_texture
 
 CANVAS = planted_texture("canvas")
 

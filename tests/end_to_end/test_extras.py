@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from stimuli.planted.textures import planted_texture
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.rig.desk.rig_files import rig_file
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
@@ -55,7 +55,7 @@ def lack(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFacto
         for name in [name for name in sys.modules if name.split(".")[0] == module]:
             monkeypatch.delitem(sys.modules, name)
         monkeypatch.setitem(sys.modules, module, None)
-        monkeypatch.delitem(sys.modules, "rig.hand.serial_sensor", raising=False)
+        monkeypatch.delitem(sys.modules, "tactileq.rig.hand.serial_sensor", raising=False)
 
     return hide
 

@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
-from rig.live.compiled import CLOCK
-from rig.setup.rig_file import SHIPPED_RIG_FILE
-from stimuli.planted.textures import planted_texture
+from tactileq.rig.live.compiled import CLOCK
+from tactileq.rig.setup.rig_file import SHIPPED_RIG_FILE
+from tactileq.stimuli.planted.textures import planted_texture
 
 Jack = Callable[..., AbstractContextManager[Any]]
 

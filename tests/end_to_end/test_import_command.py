@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.io import wavfile
 
-from modeling import RecordingSet
+from tactileq.modeling import RecordingSet
 from tests.refusals import check_refusal
 
 NOISE = np.random.default_rng(1).uniform(-0.5, 0.5, (4000, 2)).astype(np.float32)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from modeling import RecordingSet, TextureModel
+from tactileq.modeling import RecordingSet, TextureModel
 from tests.refusals import check_refusal
 
 Xml = Callable[..., str]

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from modeling import Recording, RecordingSet
-from rig.importing.files import Imported
+from tactileq.modeling import Recording, RecordingSet
+from tactileq.rig.importing.files import Imported
 from tactileq.commands.imports import add_to_set
 
 

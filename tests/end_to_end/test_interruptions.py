@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modeling import simplify as drop_layers
-from modeling.perception.thresholds import Threshold
-from modeling.perception.verdicts import ENDING
-from stimuli.planted.textures import planted_texture, record_texture
+from tactileq.modeling import simplify as drop_layers
+from tactileq.modeling.perception.thresholds import Threshold
+from tactileq.modeling.perception.verdicts import ENDING
+from tactileq.stimuli.planted.textures import planted_texture, record_texture
 
 MOMENTS = int(os.environ.get("TACTILEQ_MOMENTS", "3"))
 SPEEDS = ("--speed", "100", "--speed", "300", "--force", "1", "--force", "3")

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from modeling import (
+from tactileq.modeling import (
     Recording,
     RecordingSet,
     Simplification,
@@ -19,7 +19,7 @@ from modeling import (
     Threshold,
     simplify,
 )
-from stimuli.planted.textures import planted_texture, record_texture
+from tactileq.stimuli.planted.textures import planted_texture, record_texture
 
 AXES = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
 ENDINGS = (".json", "_layers.tsv", "_spectra.tsv", "_provenance.json")

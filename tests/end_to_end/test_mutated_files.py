@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 import soundfile
 
-from analysis.answers.hand import load_hand
-from analysis.answers.imported import load_imported, parse_map
-from analysis.answers.loading import load_responses
-from experiments.study.study import SHIPPED_STUDY, Study
-from experiments.tasks import plan_session
-from modeling import (
+from tactileq.analysis.answers.hand import load_hand
+from tactileq.analysis.answers.imported import load_imported, parse_map
+from tactileq.analysis.answers.loading import load_responses
+from tactileq.experiments.study.study import SHIPPED_STUDY, Study
+from tactileq.experiments.tasks import plan_session
+from tactileq.modeling import (
     ARModel,
     CompiledScene,
     InputError,
@@ -36,31 +36,31 @@ from modeling import (
     regressed,
     simplify,
 )
-from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.fitting.conditions import recording_spectra
-from modeling.models.loading import AnyModel, load_model
-from modeling.recordings.trajectory import load_trajectory
-from modeling.scenes.compiled import load_compiled
-from modeling.scenes.hands import HandRange
-from modeling.scenes.places import places_of
-from rig.capture.grid import StrokeGrid
-from rig.capture.pieces import PieceStore, Plan
-from rig.desk.parts import hand_settings
-from rig.hand.scripted import ScriptedTrajectory
-from rig.importing.files import import_csv, import_wav
-from rig.importing.hatt_reader import load_hatt
-from rig.importing.labels import Label, labels_from_table
-from rig.recorder.evaluation import read_evaluation
-from rig.recorder.recorder_file import SHIPPED_RECORDER_FILE, RecorderFile
-from rig.recorder.store import RECORDER_COLUMNS, RecorderStore
-from rig.setup.rig_file import SHIPPED_RIG_FILE, Figure, RigFile
-from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
-from rig.sound.signals import stimuli_of_surfaces
-from stimuli.planted.textures import planted_texture
-from stimuli.planted.vibrators import planted_vibrator
-from stimuli.sets.recipe import Recipe
-from stimuli.sets.sources import load_sources
-from stimuli.sets.writing import write_set
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.fitting.conditions import recording_spectra
+from tactileq.modeling.models.loading import AnyModel, load_model
+from tactileq.modeling.recordings.trajectory import load_trajectory
+from tactileq.modeling.scenes.compiled import load_compiled
+from tactileq.modeling.scenes.hands import HandRange
+from tactileq.modeling.scenes.places import places_of
+from tactileq.rig.capture.grid import StrokeGrid
+from tactileq.rig.capture.pieces import PieceStore, Plan
+from tactileq.rig.desk.parts import hand_settings
+from tactileq.rig.hand.scripted import ScriptedTrajectory
+from tactileq.rig.importing.files import import_csv, import_wav
+from tactileq.rig.importing.hatt_reader import load_hatt
+from tactileq.rig.importing.labels import Label, labels_from_table
+from tactileq.rig.recorder.evaluation import read_evaluation
+from tactileq.rig.recorder.recorder_file import SHIPPED_RECORDER_FILE, RecorderFile
+from tactileq.rig.recorder.store import RECORDER_COLUMNS, RecorderStore
+from tactileq.rig.setup.rig_file import SHIPPED_RIG_FILE, Figure, RigFile
+from tactileq.rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
+from tactileq.rig.sound.signals import stimuli_of_surfaces
+from tactileq.stimuli.planted.textures import planted_texture
+from tactileq.stimuli.planted.vibrators import planted_vibrator
+from tactileq.stimuli.sets.recipe import Recipe
+from tactileq.stimuli.sets.sources import load_sources
+from tactileq.stimuli.sets.writing import write_set
 from tests.mutating import mutated
 
 FEW, MANY = 40, 400  # mutations of each kind; the answers of a study are five files

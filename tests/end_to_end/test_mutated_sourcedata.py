@@ -15,9 +15,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.sessions.roster import Roster
-from experiments.sessions.withdrawing import files_of, withdraw
-from modeling import InputError
+from tactileq.experiments.sessions.roster import Roster
+from tactileq.experiments.sessions.withdrawing import files_of, withdraw
+from tactileq.modeling import InputError
 from tactileq.commands.analyze import read_answers
 from tactileq.commands.study_status import study_status
 from tests.experiments.sessions.enrolling import enrolled

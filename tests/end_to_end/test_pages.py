@@ -14,9 +14,9 @@ import pandas as pd
 import pytest
 import scipy.stats
 
-from experiments.study.study import Study
-from modeling import Scene
-from stimuli.sets.recipe import Recipe
+from tactileq.experiments.study.study import Study
+from tactileq.modeling import Scene
+from tactileq.stimuli.sets.recipe import Recipe
 from tests.end_to_end.conftest import Run, commands
 
 ROOT = Path(__file__).parents[2]

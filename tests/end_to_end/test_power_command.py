@@ -8,9 +8,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from analysis.statistics.participants.posterior import Effort
-from modeling import Threshold, simplify
-from stimuli.planted.textures import planted_texture
+from tactileq.analysis.statistics.participants.posterior import Effort
+from tactileq.modeling import Threshold, simplify
+from tactileq.stimuli.planted.textures import planted_texture
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def test_power_counts_by_the_rule_of_the_plan(
     main, place: Path, claimed_study: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     brief = Effort(chains=1, warm_up=10, steps=20, every=2)
-    monkeypatch.setattr("analysis.statistics.participants.verdict.SHORT", brief)
+    monkeypatch.setattr("tactileq.analysis.statistics.participants.verdict.SHORT", brief)
     by_model = '[plan]\nrule = "model"\n[[plan.claims]]'
     study = claimed_study.replace("participants = 2", "participants = 8")
     (place / "model.toml").write_text(study.replace("[[plan.claims]]", by_model))
@@ -101,9 +101,9 @@ def test_power_refuses_in_one_sentence_and_replaces_nothing(main, place: Path) -
 
 @pytest.mark.usefixtures("undrawn")
 def test_the_report_gets_the_appendix(main, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from benches.validation import model as validation_model
-    from benches.validation import procedures as validation
-    from benches.validation import ranks as validation_ranks
+    from tactileq.benches.validation import model as validation_model
+    from tactileq.benches.validation import procedures as validation
+    from tactileq.benches.validation import ranks as validation_ranks
 
     few = validation.cells(["TOST, guard on ends"], sizes=[8])
     monkeypatch.setattr(validation, "cells", lambda: few)

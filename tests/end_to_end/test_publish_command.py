@@ -14,9 +14,9 @@ import pytest
 import tomlkit
 from rocrate.rocrate import ROCrate
 
-from experiments.sessions.stored_sessions import held_sessions
-from experiments.study.study import Study
-from modeling.files.hashes import seal_over
+from tactileq.experiments.sessions.stored_sessions import held_sessions
+from tactileq.experiments.study.study import Study
+from tactileq.modeling.files.hashes import seal_over
 from tests.experiments.verification.small_studies import (
     run_all,
     simplified_texture,
@@ -38,7 +38,7 @@ PUBLICATION = {
 @pytest.fixture(autouse=True)
 def quick(undrawn: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports without pictures, and with fewer simulated tables, of which no test here is."""
-    monkeypatch.setattr("analysis.chapters.confusions.similarity_choice.SIMULATIONS", 9)
+    monkeypatch.setattr("tactileq.analysis.chapters.confusions.similarity_choice.SIMULATIONS", 9)
 
 
 @pytest.fixture(scope="module")

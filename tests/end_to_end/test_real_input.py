@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.io import wavfile
 
-from modeling import Recording, RecordingSet, TextureModel
-from stimuli.planted.textures import planted_texture, record_texture
+from tactileq.modeling import Recording, RecordingSet, TextureModel
+from tactileq.stimuli.planted.textures import planted_texture, record_texture
 
 G_PER_FULLSCALE = 8.0
 SPEEDS_MM_S = (60.0, 120.0, 180.0, 240.0, 300.0)

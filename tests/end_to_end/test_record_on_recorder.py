@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.textures.between import halfway, truth_summary
-from modeling import RecordingSet, fit_texture
-from modeling.files.tables import read_cells
-from rig.device.emulating import Emulator
-from rig.live.clock import now_s, sleep
-from rig.recorder.recorder_file import SHIPPED_RECORDER_FILE, RecorderFile
-from rig.recorder.store import RECORDER_COLUMNS, TABLE_NAME
-from stimuli.planted.textures import (
+from tactileq.analysis.textures.between import halfway, truth_summary
+from tactileq.modeling import RecordingSet, fit_texture
+from tactileq.modeling.files.tables import read_cells
+from tactileq.rig.device.emulating import Emulator
+from tactileq.rig.live.clock import now_s, sleep
+from tactileq.rig.recorder.recorder_file import SHIPPED_RECORDER_FILE, RecorderFile
+from tactileq.rig.recorder.store import RECORDER_COLUMNS, TABLE_NAME
+from tactileq.stimuli.planted.textures import (
     FORCES_N,
     RECORDER_RATE_HZ,
     SPEEDS_MM_S,
@@ -93,7 +93,7 @@ def test_what_cannot_be_recorded_is_refused(
 
 
 def test_the_shipped_file_is_the_default_law() -> None:
-    from rig.recorder.law import RecorderLaw
+    from tactileq.rig.recorder.law import RecorderLaw
 
     assert RecorderFile.load(SHIPPED_RECORDER_FILE).law() == RecorderLaw()
 

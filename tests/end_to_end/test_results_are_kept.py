@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modeling import Recording, RecordingSet, TextureModel
-from modeling.files.provenance import provenance_of, seal_folder
-from stimuli.planted.textures import planted_texture, record_texture
+from tactileq.modeling import Recording, RecordingSet, TextureModel
+from tactileq.modeling.files.provenance import provenance_of, seal_folder
+from tactileq.stimuli.planted.textures import planted_texture, record_texture
 
 # A threshold below which the fine layers of the planted textures lie.
 INSENSITIVE = "# source: test\n# caveat: none\nfrequency_hz\tacceleration_g\n10\t0.2\n600\t0.2\n"

@@ -17,11 +17,11 @@ from typing import Any
 
 import pytest
 
-from modeling import ARModel, TextureModel
-from rig.setup.rig_file import RigFile
-from rig.simulated.card import DEVICE, SimulatedCard
-from rig.simulated.vibrator import SimulatedTransducers
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import ARModel, TextureModel
+from tactileq.rig.setup.rig_file import RigFile
+from tactileq.rig.simulated.card import DEVICE, SimulatedCard
+from tactileq.rig.simulated.vibrator import SimulatedTransducers
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.modeling.rendering.lattices import planted_ar
 from tests.rig.calibration.card import rig_file
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stimuli.planted.textures import planted_texture
-from stimuli.planted.vibrators import planted_vibrator
+from tactileq.stimuli.planted.textures import planted_texture
+from tactileq.stimuli.planted.vibrators import planted_vibrator
 from tests.rig.desk.rig_files import rig_file
 
 Jack = Callable[..., AbstractContextManager[Any]]

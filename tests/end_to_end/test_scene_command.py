@@ -12,18 +12,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.observers.experimenter import SimulatedExperimenter
-from experiments.observers.percepts import Perception
-from experiments.observers.psychometrics import Psychometrics
-from experiments.observers.simulated import SimulatedParticipant
-from experiments.sessions.manifest import SessionManifest
-from experiments.study.models import ModelSets
-from experiments.study.study import Study
-from modeling import Scene, TextureModel, Threshold, compile_scene
-from modeling.errors import counted
-from modeling.models.loading import load_models
-from modeling.scenes.compiled import load_compiled
-from stimuli.planted.textures import planted_texture
+from tactileq.experiments.observers.experimenter import SimulatedExperimenter
+from tactileq.experiments.observers.percepts import Perception
+from tactileq.experiments.observers.psychometrics import Psychometrics
+from tactileq.experiments.observers.simulated import SimulatedParticipant
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.study import Study
+from tactileq.modeling import Scene, TextureModel, Threshold, compile_scene
+from tactileq.modeling.errors import counted
+from tactileq.modeling.models.loading import load_models
+from tactileq.modeling.scenes.compiled import load_compiled
+from tactileq.stimuli.planted.textures import planted_texture
 
 SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
 SCENE = """
@@ -136,7 +136,7 @@ def test_there_is_no_header_of_models_of_different_rates(main, place: Path) -> N
 
 
 def test_without_the_kernel_nothing_is_timed(main, place: Path, monkeypatch) -> None:
-    monkeypatch.setattr("modeling.rendering.compiled.is_compiled", lambda: False)
+    monkeypatch.setattr("tactileq.modeling.rendering.compiled.is_compiled", lambda: False)
     made = main("scene", "light.toml")
     assert made.returncode == 0, made.stderr
     assert "note: without the compiled kernel no strokes are rendered" in made.stdout

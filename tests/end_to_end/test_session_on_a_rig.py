@@ -15,15 +15,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.answers.loading import load_responses
-from experiments.sessions.log import read_log
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.people import Choice, Rating
-from experiments.sessions.surfaces import Surfaces
-from experiments.verification.verifying import verify_data
-from rig.desk.lock import rig_locked
-from rig.setup.rig_file import RigFile
-from stimuli.planted.textures import planted_texture
+from tactileq.analysis.answers.loading import load_responses
+from tactileq.experiments.sessions.log import read_log
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.people import Choice, Rating
+from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.verification.verifying import verify_data
+from tactileq.rig.desk.lock import rig_locked
+from tactileq.rig.setup.rig_file import RigFile
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.experiments.scripted import Ready, Scripted
 from tests.rig.desk.rig_files import rig_text
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from benches.atlas.cases import CASES
+from tactileq.benches.atlas.cases import CASES
 
 CONTENTS = {
     "cells.tsv",

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from stimuli.planted.textures import planted_texture
-from stimuli.sets.recipe import Recipe
+from tactileq.stimuli.planted.textures import planted_texture
+from tactileq.stimuli.sets.recipe import Recipe
 
 RECIPE = """
 version = 1

@@ -13,14 +13,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.sessions.traces import PRESENTATION_COLUMNS
-from experiments.study.study import SHIPPED_STUDY, Study
-from modeling import Threshold, simplify
-from modeling.files.columns import Column
-from modeling.files.describing import schema
-from modeling.files.stimulus_table import STIMULUS_COLUMNS
-from modeling.files.tables import read_table
-from stimuli.planted.textures import planted_texture
+from tactileq.experiments.sessions.traces import PRESENTATION_COLUMNS
+from tactileq.experiments.study.study import SHIPPED_STUDY, Study
+from tactileq.modeling import Threshold, simplify
+from tactileq.modeling.files.columns import Column
+from tactileq.modeling.files.describing import schema
+from tactileq.modeling.files.stimulus_table import STIMULUS_COLUMNS
+from tactileq.modeling.files.tables import read_table
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.refusals import check_refusal
 
 SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}

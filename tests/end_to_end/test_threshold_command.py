@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from modeling import Simplification, Threshold
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import Simplification, Threshold
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.experiments.tasks.planted_threshold import rows_of, write_answers
 from tests.experiments.tasks.test_threshold_table import answers
 

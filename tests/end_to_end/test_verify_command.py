@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from modeling.files.hashes import sha256_of_file
+from tactileq.modeling.files.hashes import sha256_of_file
 from tests.experiments.verification.small_studies import (
     run_all,
     run_one,
@@ -22,7 +22,7 @@ TEXTURES = ("canvas", "PVC")
 @pytest.fixture(autouse=True)
 def quick(undrawn: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports without pictures, and with fewer simulated tables, of which no test here is."""
-    monkeypatch.setattr("analysis.chapters.confusions.similarity_choice.SIMULATIONS", 9)
+    monkeypatch.setattr("tactileq.analysis.chapters.confusions.similarity_choice.SIMULATIONS", 9)
 
 
 @pytest.fixture(scope="module")

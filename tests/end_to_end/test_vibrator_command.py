@@ -10,12 +10,12 @@ import pytest
 import soundfile
 from PIL import Image
 
-from modeling import Limits, Vibrator, compensation_for
-from modeling.files.stimulus_table import STIMULUS_COLUMNS
-from modeling.files.tables import read_table
-from stimuli.exports.c_header import write_c_header
-from stimuli.planted.textures import planted_texture
-from stimuli.planted.vibrators import SimulatedVibrator
+from tactileq.modeling import Limits, Vibrator, compensation_for
+from tactileq.modeling.files.stimulus_table import STIMULUS_COLUMNS
+from tactileq.modeling.files.tables import read_table
+from tactileq.stimuli.exports.c_header import write_c_header
+from tactileq.stimuli.planted.textures import planted_texture
+from tactileq.stimuli.planted.vibrators import SimulatedVibrator
 
 RATE_HZ = 22050
 

@@ -9,16 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from experiments.sessions.people import Choice, Rating
-from experiments.sessions.surfaces import Surfaces
-from experiments.study.models import ModelSets
-from experiments.study.study import Study
-from experiments.study.task_plan import TaskPlan
-from experiments.tasks.absolute import AbsoluteTrial
-from experiments.tasks.relative import RelativeTrial
-from modeling import TextureModel, Threshold, simplify
-from rig.interface import Acceleration, Fault, HandRows, PresentationRecord, RigHealth, RigReading
-from stimuli.planted.textures import planted_texture
+from tactileq.experiments.sessions.people import Choice, Rating
+from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.study.task_plan import TaskPlan
+from tactileq.experiments.tasks.absolute import AbsoluteTrial
+from tactileq.experiments.tasks.relative import RelativeTrial
+from tactileq.modeling import TextureModel, Threshold, simplify
+from tactileq.rig.interface import Acceleration, Fault, HandRows, PresentationRecord, RigHealth, RigReading
+from tactileq.stimuli.planted.textures import planted_texture
 
 TEXTURES = ("canvas", "MDF", "PVC")
 

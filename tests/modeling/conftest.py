@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from modeling import Recording, RegressedModel, TextureModel
+from tactileq.modeling import Recording, RegressedModel, TextureModel
 
 
 def make_model(

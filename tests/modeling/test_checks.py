@@ -7,8 +7,8 @@ from decimal import Decimal
 import numpy as np
 import pytest
 
-from modeling import InputError
-from modeling.checks import (
+from tactileq.modeling import InputError
+from tactileq.modeling.checks import (
     check_choice,
     check_duration,
     check_name,
@@ -20,7 +20,7 @@ from modeling.checks import (
     is_positive,
     is_whole,
 )
-from modeling.errors import shown
+from tactileq.modeling.errors import shown
 from tests.refusals import refused
 
 NUMBERS = (0, -3, 2.5, float("nan"), np.float64(1.5), np.float32(1.5), np.int64(4), np.uint8(4))

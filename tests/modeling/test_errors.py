@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from modeling.errors import counted
+from tactileq.modeling.errors import counted
 
 
 @pytest.mark.parametrize(

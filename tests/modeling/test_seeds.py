@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modeling.seeds import generator, noise_seed, noise_stream, number_of
+from tactileq.modeling.seeds import generator, noise_seed, noise_stream, number_of
 
 seeds = st.integers(0, 2**63)
 keys = st.lists(st.integers(0, 2**32 - 1), max_size=3)

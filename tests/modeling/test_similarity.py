@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from modeling import (
+from tactileq.modeling import (
     PEQ,
     ARFilter,
     ARModel,
@@ -20,7 +20,7 @@ from modeling import (
     similarity,
     spectrum,
 )
-from modeling.recordings.spectrum import Spectrum
+from tactileq.modeling.recordings.spectrum import Spectrum
 from tests.refusals import refused
 
 ModelMaker = Callable[..., TextureModel]

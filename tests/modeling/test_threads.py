@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from modeling.threads import in_order
+from tactileq.modeling.threads import in_order
 
 PATIENCE_S = 500.0
 
@@ -79,7 +79,7 @@ def test_an_exception_comes_where_its_result_would_have(threads: int) -> None:
 def test_linear_algebra_that_is_loaded_late_is_on_one_thread_too() -> None:
     """In a fresh process, where SciPy's own library is not loaded before."""
     source = (
-        "from modeling.threads import one_linear_algebra_thread\n"
+        "from tactileq.modeling.threads import one_linear_algebra_thread\n"
         "with one_linear_algebra_thread():\n"
         "    import scipy.linalg\n"
         "    from threadpoolctl import threadpool_info\n"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from modeling import TextureModel
-from modeling.arrays import Floats
-from rig.interface import Stimulus
+from tactileq.modeling import TextureModel
+from tactileq.modeling.arrays import Floats
+from tactileq.rig.interface import Stimulus
 
 
 def planted_model(gain: float = 0.2, *, rate_hz: float = 5000.0) -> TextureModel:

@@ -8,12 +8,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modeling import InputError, Renderer
-from modeling.hand import Hand
-from rig.device.registers import DeviceSimulation
-from rig.device_twin import LOOK_S, WALL, DeviceTwin
-from rig.interface import SURFACES, HandRows, ToneBurst
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import InputError, Renderer
+from tactileq.modeling.hand import Hand
+from tactileq.rig.device.registers import DeviceSimulation
+from tactileq.rig.device_twin import LOOK_S, WALL, DeviceTwin
+from tactileq.rig.interface import SURFACES, HandRows, ToneBurst
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 
 LEATHER = planted_texture("leather")

@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from modeling import InputError
-from rig import inventory
-from rig.hand.sample import ConnectedDevice
-from rig.inventory import Finding, connected_input, connected_sound, of_rig, remedies, versions
-from rig.sound.devices import NoPortAudio, SoundDevice
+from tactileq.modeling import InputError
+from tactileq.rig import inventory
+from tactileq.rig.hand.sample import ConnectedDevice
+from tactileq.rig.inventory import Finding, connected_input, connected_sound, of_rig, remedies, versions
+from tactileq.rig.sound.devices import NoPortAudio, SoundDevice
 from tests.refusals import check_refusal
 from tests.rig.desk.rig_files import rig_file, rig_text
 
@@ -119,7 +119,7 @@ def test_without_psychopy_the_rig_is_checked_all_the_same(monkeypatch: pytest.Mo
     def none(name: str) -> str:
         raise PackageNotFoundError(name)
 
-    monkeypatch.setattr("modeling.files.provenance.version", none)
+    monkeypatch.setattr("tactileq.modeling.files.provenance.version", none)
     found = {finding.name: finding for finding in versions()}
     assert found["psychopy"].state == "note"
     check_refusal(found["psychopy"].sentence, expected="psychopy", got="tactileq[console]")

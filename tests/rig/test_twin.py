@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from modeling import InputError, Renderer, regressed
-from modeling.models.loading import Layered
-from rig.interface import SURFACES, RigReading, TextureRig, ToneBurst
-from rig.sound.signals import tone_burst
-from rig.twin import SimulatedRig
+from tactileq.modeling import InputError, Renderer, regressed
+from tactileq.modeling.models.loading import Layered
+from tactileq.rig.interface import SURFACES, RigReading, TextureRig, ToneBurst
+from tactileq.rig.sound.signals import tone_burst
+from tactileq.rig.twin import SimulatedRig
 from tests.refusals import refused
 from tests.rig.planted import planted_model as model
 from tests.rig.planted import planted_stimulus

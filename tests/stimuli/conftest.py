@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modeling import TextureModel, Vibrator
-from stimuli.planted.textures import planted_texture
-from stimuli.planted.vibrators import planted_vibrator
-from stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
+from tactileq.modeling import TextureModel, Vibrator
+from tactileq.stimuli.planted.textures import planted_texture
+from tactileq.stimuli.planted.vibrators import planted_vibrator
+from tactileq.stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
 
 SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
 

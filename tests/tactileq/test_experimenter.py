@@ -11,7 +11,7 @@ from typing import TextIO
 import pytest
 from rich.console import Console
 
-from experiments.sessions.people import ProgressReport, SessionAborted
+from tactileq.experiments.sessions.people import ProgressReport, SessionAborted
 from tactileq.experimenter import Terminal
 from tests.refusals import refused
 from tests.rig.waiting import wait_until

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from modeling.files.provenance import PROVENANCE_NAME
+from tactileq.modeling.files.provenance import PROVENANCE_NAME
 from tactileq.own_results import check_own_results
 
 

@@ -9,30 +9,30 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.answers.loading import load_responses
-from analysis.labels import ALL_TEXTURES
-from analysis.power.power import EVERY_TEXTURE, MEAN_ALONE, POWER_COLUMNS, judged_claims
-from analysis.statistics.caveats import WITHHELD
-from analysis.statistics.compared_answers import claim_values
-from analysis.statistics.equivalence import (
+from tactileq.analysis.answers.loading import load_responses
+from tactileq.analysis.labels import ALL_TEXTURES
+from tactileq.analysis.power.power import EVERY_TEXTURE, MEAN_ALONE, POWER_COLUMNS, judged_claims
+from tactileq.analysis.statistics.caveats import WITHHELD
+from tactileq.analysis.statistics.compared_answers import claim_values
+from tactileq.analysis.statistics.equivalence import (
     DIFFERENT,
     EQUAL_ON_AVERAGE,
     EQUIVALENT,
     INCONCLUSIVE,
     WITHIN_BOUNDS,
 )
-from analysis.statistics.participants.posterior import Effort
-from analysis.statistics.verdicts import people_data
-from benches.validation.procedures import cells, simulate_cell
-from experiments.observers.in_memory import simulate_sessions
-from experiments.observers.whole_study import simulate_study
-from experiments.study.models import ModelSets
-from experiments.study.study import Study
-from experiments.study.task_plan import TaskPlan
-from modeling import InputError, Threshold, simplify
-from modeling.files.claims import ClaimSection, PlanSection
-from rig.twin import SimulatedRig
-from stimuli.planted.textures import planted_texture
+from tactileq.analysis.statistics.participants.posterior import Effort
+from tactileq.analysis.statistics.verdicts import people_data
+from tactileq.benches.validation.procedures import cells, simulate_cell
+from tactileq.experiments.observers.in_memory import simulate_sessions
+from tactileq.experiments.observers.whole_study import simulate_study
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.study.task_plan import TaskPlan
+from tactileq.modeling import InputError, Threshold, simplify
+from tactileq.modeling.files.claims import ClaimSection, PlanSection
+from tactileq.rig.twin import SimulatedRig
+from tactileq.stimuli.planted.textures import planted_texture
 from tactileq.commands.power import planted_effects, sizes_of
 from tactileq.power_in_memory import (
     SimulatedStudy,

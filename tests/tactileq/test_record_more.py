@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from modeling import InputError, RecordingSet
-from rig.capture.coverage import Coverage
-from rig.capture.grid import StrokeGrid
-from stimuli.planted.drawn import draw_surface
+from tactileq.modeling import InputError, RecordingSet
+from tactileq.rig.capture.coverage import Coverage
+from tactileq.rig.capture.grid import StrokeGrid
+from tactileq.stimuli.planted.drawn import draw_surface
 from tactileq.commands import record_audio
 from tactileq.commands.record_audio import (
     HandOptions,

@@ -11,12 +11,12 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from experiments.sessions.log import read_log
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.people import SessionAborted
-from experiments.sessions.surfaces import Surfaces
-from experiments.study.study import Study
-from modeling import InputError
+from tactileq.experiments.sessions.log import read_log
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.people import SessionAborted
+from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.study.study import Study
+from tactileq.modeling import InputError
 from tactileq.commands.session import session
 from tests.experiments.scripted import Ready, Scripted
 from tests.refusals import refused

@@ -11,15 +11,15 @@ import typer
 from rich.console import Console
 from typer.testing import CliRunner
 
-from experiments.sessions.roster import Roster
-from experiments.sessions.status import (
+from tactileq.experiments.sessions.roster import Roster
+from tactileq.experiments.sessions.status import (
     PersonProgress,
     SessionProgress,
     StudyProgress,
     TaskProgress,
 )
-from experiments.study.study import SHIPPED_STUDY, Study
-from modeling import InputError
+from tactileq.experiments.study.study import SHIPPED_STUDY, Study
+from tactileq.modeling import InputError
 from tactileq.commands.study_status import table_of
 from tactileq.commands.study_withdraw import study_dropout, study_withdraw
 from tests.experiments.sessions.enrolling import enrolled

@@ -89,7 +89,7 @@ class Copy:
 
     def _require_own_modules(self) -> None:
         """Refuse a copy whose tests would run the installed project."""
-        modules = ("modeling.rendering._kernel", "rig.live._live", "tactileq.app", "tests.conftest")
+        modules = ("tactileq.modeling.rendering._kernel", "tactileq.rig.live._live", "tactileq.app", "tests.conftest")
         told = "; ".join(f"import {name} as m; print(m.__file__)" for name in modules)
         for file in self._run(sys.executable, "-c", told).split():
             if not Path(file).is_relative_to(self.folder):

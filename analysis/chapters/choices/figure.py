@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from analysis.figures.answers import LEGEND_OF_BARS, plot_paired_bars
-from analysis.page.drawing import BLACK, GREY, shared_legend
-from analysis.statistics.verdicts import ClaimFound
+from tactileq.analysis.figures.answers import LEGEND_OF_BARS, plot_paired_bars
+from tactileq.analysis.page.drawing import BLACK, GREY, shared_legend
+from tactileq.analysis.statistics.verdicts import ClaimFound
 
 
 def figure_correct_rates(found: ClaimFound, *, chance: float, simulated: bool) -> Figure:

@@ -7,17 +7,17 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from analysis.chapters.chapter import Answered, Stream, named_by, who_took_part
-from analysis.chapters.choices.figure import figure_correct_rates
-from analysis.labels import ALL_TEXTURES, TASK_TITLES, names_or_none, sentence_case
-from analysis.page.outcomes import Outcome, Weight
-from analysis.page.page import Picture, Table
-from analysis.page.sections import Section, of_task
-from analysis.statistics.compared_answers import chance_of, models_of
-from analysis.statistics.rates import CORRECT_RATE_COLUMNS, UNKNOWN_CHANCE, correct_rates
-from analysis.statistics.verdicts import ClaimFound
-from modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
-from modeling.files.columns import chosen, without
+from tactileq.analysis.chapters.chapter import Answered, Stream, named_by, who_took_part
+from tactileq.analysis.chapters.choices.figure import figure_correct_rates
+from tactileq.analysis.labels import ALL_TEXTURES, TASK_TITLES, names_or_none, sentence_case
+from tactileq.analysis.page.outcomes import Outcome, Weight
+from tactileq.analysis.page.page import Picture, Table
+from tactileq.analysis.page.sections import Section, of_task
+from tactileq.analysis.statistics.compared_answers import chance_of, models_of
+from tactileq.analysis.statistics.rates import CORRECT_RATE_COLUMNS, UNKNOWN_CHANCE, correct_rates
+from tactileq.analysis.statistics.verdicts import ClaimFound
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
+from tactileq.modeling.files.columns import chosen, without
 
 ALPHA = 0.05
 CORRECT_RATES_SHOWN = (

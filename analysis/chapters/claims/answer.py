@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from analysis.answers.responses import Responses
-from analysis.chapters.claims.people_sentences import headline
-from analysis.chapters.claims.sentences import (
+from tactileq.analysis.answers.responses import Responses
+from tactileq.analysis.chapters.claims.people_sentences import headline
+from tactileq.analysis.chapters.claims.sentences import (
     by_verdict,
     difference,
 )
-from analysis.labels import MEASURES, TASK_TITLES, sentence_case
-from analysis.page.sections import Headline
-from analysis.statistics.caveats import (
+from tactileq.analysis.labels import MEASURES, TASK_TITLES, sentence_case
+from tactileq.analysis.page.sections import Headline
+from tactileq.analysis.statistics.caveats import (
     BOUNDS_WITHHELD,
     DIFFERENCES,
     INTERIM,
     WITHHELD,
     WITHOUT_EQUALITY,
 )
-from analysis.statistics.claims import NO_TEST
-from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE, WITHIN_BOUNDS
-from analysis.statistics.verdicts import ClaimFound, overall_row
+from tactileq.analysis.statistics.claims import NO_TEST
+from tactileq.analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE, WITHIN_BOUNDS
+from tactileq.analysis.statistics.verdicts import ClaimFound, overall_row
 
 WORDS = {
     EQUIVALENT: "equivalent in",

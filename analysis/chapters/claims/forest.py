@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from analysis.answers.plan import MODEL_RULE
-from analysis.page.drawing import (
+from tactileq.analysis.answers.plan import MODEL_RULE
+from tactileq.analysis.page.drawing import (
     BLACK,
     BLUE,
     GREEN,
@@ -25,9 +25,9 @@ from analysis.page.drawing import (
     VERMILLION,
     stamp_if_simulated,
 )
-from analysis.statistics.caveats import BOUNDS_WITHHELD, WITHHELD
-from analysis.statistics.claims import CONTROL
-from analysis.statistics.equivalence import (
+from tactileq.analysis.statistics.caveats import BOUNDS_WITHHELD, WITHHELD
+from tactileq.analysis.statistics.claims import CONTROL
+from tactileq.analysis.statistics.equivalence import (
     ALL_BUT,
     AVERAGE_FELT,
     DIFFERENT,
@@ -37,8 +37,8 @@ from analysis.statistics.equivalence import (
     INCONCLUSIVE,
     WITHIN_BOUNDS,
 )
-from analysis.statistics.verdicts import ClaimFound
-from modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.analysis.statistics.verdicts import ClaimFound
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
 
 # Distinguished by shape as well as by colour.
 MARKS = {

@@ -7,15 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from analysis.answers.responses import Responses
-from analysis.labels import SCALES
-from analysis.statistics.compared_answers import decision_model
-from analysis.statistics.participants.posterior import UNSEEN, Effort
-from analysis.statistics.participants.verdict import DOUBLED_CHAINS, FEWEST
-from analysis.statistics.verdicts import ClaimFound
-from modeling.participants.choices import ChoicePriors, DecisionModel
-from modeling.participants.effects import COMPONENTS, EffectPriors
-from modeling.participants.ratings import AT_END, RatingPriors
+from tactileq.analysis.answers.responses import Responses
+from tactileq.analysis.labels import SCALES
+from tactileq.analysis.statistics.compared_answers import decision_model
+from tactileq.analysis.statistics.participants.posterior import UNSEEN, Effort
+from tactileq.analysis.statistics.participants.verdict import DOUBLED_CHAINS, FEWEST
+from tactileq.analysis.statistics.verdicts import ClaimFound
+from tactileq.modeling.participants.choices import ChoicePriors, DecisionModel
+from tactileq.modeling.participants.effects import COMPONENTS, EffectPriors
+from tactileq.modeling.participants.ratings import AT_END, RatingPriors
 
 _GAMMA = "inverse-gamma variances of shape 2"
 

@@ -9,13 +9,13 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from analysis.chapters.claims.people_figure import figure_people
-from analysis.chapters.claims.people_sentences import verdict_of_doubled
-from analysis.page.page import Fold, Item, Picture, Table
-from analysis.statistics.participants.verdict import PEOPLE_COLUMNS, PeopleSummary
-from analysis.statistics.verdicts import ClaimFound, overall_row
-from modeling.files.columns import Column, names
-from modeling.files.writing import file_stem
+from tactileq.analysis.chapters.claims.people_figure import figure_people
+from tactileq.analysis.chapters.claims.people_sentences import verdict_of_doubled
+from tactileq.analysis.page.page import Fold, Item, Picture, Table
+from tactileq.analysis.statistics.participants.verdict import PEOPLE_COLUMNS, PeopleSummary
+from tactileq.analysis.statistics.verdicts import ClaimFound, overall_row
+from tactileq.modeling.files.columns import Column, names
+from tactileq.modeling.files.writing import file_stem
 
 PRIORS_COLUMNS = (
     Column("claim", is_name=True),

@@ -9,8 +9,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.labels import unit_of
-from analysis.page.drawing import (
+from tactileq.analysis.labels import unit_of
+from tactileq.analysis.page.drawing import (
     BLACK,
     BLUE,
     GREY,
@@ -20,10 +20,10 @@ from analysis.page.drawing import (
     shared_legend,
     stamp_if_simulated,
 )
-from analysis.statistics.participants.verdict import LIKELY, PeopleFound, PeopleSummary
-from analysis.statistics.verdicts import ClaimFound
-from modeling.arrays import Bools
-from modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.analysis.statistics.participants.verdict import LIKELY, PeopleFound, PeopleSummary
+from tactileq.analysis.statistics.verdicts import ClaimFound
+from tactileq.modeling.arrays import Bools
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
 
 INSIDE, OUTSIDE, CARELESS = ("o", BLUE), ("D", VERMILLION), ("s", GREY)
 MOST_TICKS = 40  # participants whose names still fit below the axis

@@ -5,9 +5,9 @@ docs/method/participants.md#verdict
 
 from __future__ import annotations
 
-from analysis.labels import sentence_case, signed, unit_of
-from analysis.statistics.caveats import BOUNDS_WITHHELD, WITHHELD
-from analysis.statistics.equivalence import (
+from tactileq.analysis.labels import sentence_case, signed, unit_of
+from tactileq.analysis.statistics.caveats import BOUNDS_WITHHELD, WITHHELD
+from tactileq.analysis.statistics.equivalence import (
     ALL_BUT,
     AVERAGE_FELT,
     DIFFERENT,
@@ -16,9 +16,9 @@ from analysis.statistics.equivalence import (
     INCONCLUSIVE,
     WITHIN_BOUNDS,
 )
-from analysis.statistics.participants.verdict import LIKELY, PeopleFound
-from analysis.statistics.verdicts import ClaimFound, Row
-from modeling.errors import counted
+from tactileq.analysis.statistics.participants.verdict import LIKELY, PeopleFound
+from tactileq.analysis.statistics.verdicts import ClaimFound, Row
+from tactileq.modeling.errors import counted
 
 HIGHEST_R_HAT = 1.05
 WORTH_A_WORD = 0.05  # share of lapsed trials, or of ratings at an end, that may part two verdicts

@@ -6,16 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analysis.answers.plan import EQUIVALENCE, MODEL_RULE, Claim
-from analysis.answers.responses import Responses
-from analysis.chapters.claims.model_sentences import decided_by_tests, model_methods
-from analysis.labels import MEASURES, TASK_TITLES
-from analysis.statistics.compared_answers import chance_of
-from analysis.statistics.described_verdicts import incomplete
-from analysis.statistics.verdicts import ClaimFound
-from modeling.errors import counted
-from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.columns import shortened_hash
+from tactileq.analysis.answers.plan import EQUIVALENCE, MODEL_RULE, Claim
+from tactileq.analysis.answers.responses import Responses
+from tactileq.analysis.chapters.claims.model_sentences import decided_by_tests, model_methods
+from tactileq.analysis.labels import MEASURES, TASK_TITLES
+from tactileq.analysis.statistics.compared_answers import chance_of
+from tactileq.analysis.statistics.described_verdicts import incomplete
+from tactileq.analysis.statistics.verdicts import ClaimFound
+from tactileq.modeling.errors import counted
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.files.columns import shortened_hash
 
 MOST_NAMED = 12
 

@@ -7,27 +7,27 @@ from dataclasses import replace
 
 import pandas as pd
 
-from analysis.answers.responses import Responses
-from analysis.chapters.chapter import LEAD, Answered, who_took_part
-from analysis.chapters.claims.answer import answer, unfinished_tasks
-from analysis.chapters.claims.forest import figure_forest
-from analysis.chapters.claims.people import people_items
-from analysis.chapters.claims.people_sentences import FEEL_IT
-from analysis.chapters.claims.plan_sentences import deviations, methods_paragraph
-from analysis.chapters.claims.sentences import claim_outcomes
-from analysis.labels import sentence_case
-from analysis.page.page import Fold, Picture, Table
-from analysis.page.sections import Section
-from analysis.statistics.claims import CLAIM_COLUMNS, NO_TEST, VERDICT_COLUMNS
-from analysis.statistics.described_verdicts import (
+from tactileq.analysis.answers.responses import Responses
+from tactileq.analysis.chapters.chapter import LEAD, Answered, who_took_part
+from tactileq.analysis.chapters.claims.answer import answer, unfinished_tasks
+from tactileq.analysis.chapters.claims.forest import figure_forest
+from tactileq.analysis.chapters.claims.people import people_items
+from tactileq.analysis.chapters.claims.people_sentences import FEEL_IT
+from tactileq.analysis.chapters.claims.plan_sentences import deviations, methods_paragraph
+from tactileq.analysis.chapters.claims.sentences import claim_outcomes
+from tactileq.analysis.labels import sentence_case
+from tactileq.analysis.page.page import Fold, Picture, Table
+from tactileq.analysis.page.sections import Section
+from tactileq.analysis.statistics.claims import CLAIM_COLUMNS, NO_TEST, VERDICT_COLUMNS
+from tactileq.analysis.statistics.described_verdicts import (
     PLANTED_COLUMNS,
     SETUP_COLUMNS,
     differences_by_setup,
     planted_verdicts,
 )
-from analysis.statistics.equivalence import INCONCLUSIVE
-from analysis.statistics.verdicts import ClaimFound, overall_row
-from modeling.files.columns import Columns, chosen, names, without
+from tactileq.analysis.statistics.equivalence import INCONCLUSIVE
+from tactileq.analysis.statistics.verdicts import ClaimFound, overall_row
+from tactileq.modeling.files.columns import Columns, chosen, names, without
 
 TESTS_SHOWN = chosen(
     CLAIM_COLUMNS,

@@ -6,19 +6,19 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from analysis.chapters.claims.people_sentences import (
+from tactileq.analysis.chapters.claims.people_sentences import (
     chains_disagree,
     disagreement,
     doubled_priors,
     texture_effect,
 )
-from analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES, sentence_case, signed, unit_of
-from analysis.page.outcomes import Outcome, Weight
-from analysis.statistics.caveats import DIFFERENCES, INTERIM, WITHOUT_EQUALITY
-from analysis.statistics.claims import CONTROL, NO_TEST, all_equivalent
-from analysis.statistics.verdicts import ClaimFound, Row, overall_row
-from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.columns import p_value
+from tactileq.analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES, sentence_case, signed, unit_of
+from tactileq.analysis.page.outcomes import Outcome, Weight
+from tactileq.analysis.statistics.caveats import DIFFERENCES, INTERIM, WITHOUT_EQUALITY
+from tactileq.analysis.statistics.claims import CONTROL, NO_TEST, all_equivalent
+from tactileq.analysis.statistics.verdicts import ClaimFound, Row, overall_row
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.files.columns import p_value
 
 _JOINTLY = "all textures jointly equivalent (largest p of TOST below .05)"
 _JOINTLY_BY_MODEL = (

@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from modeling.arrays import Floats
-from modeling.files.columns import Column, names
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.files.columns import Column, names
 
 Whole = NDArray[np.intp]
 REDRAWN = 9999

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from modeling import InputError
+from tactileq.modeling import InputError
 
 RESAMPLES = 9999  # all swaps where there are fewer, that is up to 13 participants
 

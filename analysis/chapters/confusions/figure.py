@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.figures.confusions import DARK, TEXT, name_axes, plot_confusion
-from analysis.page.drawing import GREY, stamp_if_simulated
-from analysis.statistics.confusion import ConfusionMatrix
-from modeling.arrays import Floats
+from tactileq.analysis.figures.confusions import DARK, TEXT, name_axes, plot_confusion
+from tactileq.analysis.page.drawing import GREY, stamp_if_simulated
+from tactileq.analysis.statistics.confusion import ConfusionMatrix
+from tactileq.modeling.arrays import Floats
 
 CELL_INCHES = 0.62
 

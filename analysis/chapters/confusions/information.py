@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from modeling import InputError
-from modeling.arrays import Floats
+from tactileq.modeling import InputError
+from tactileq.modeling.arrays import Floats
 
 CONFIDENCE = 0.95
 

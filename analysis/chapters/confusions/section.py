@@ -11,32 +11,32 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from analysis.chapters.chapter import Answered, Stream
-from analysis.chapters.confusions.buttons import BUTTON_COLUMNS, ButtonPreference, button_preference
-from analysis.chapters.confusions.change import confusion_change_p
-from analysis.chapters.confusions.figure import figure_confusion, figure_similarities
-from analysis.chapters.confusions.information import transferred_information
-from analysis.chapters.confusions.similarity_choice import (
+from tactileq.analysis.chapters.chapter import Answered, Stream
+from tactileq.analysis.chapters.confusions.buttons import BUTTON_COLUMNS, ButtonPreference, button_preference
+from tactileq.analysis.chapters.confusions.change import confusion_change_p
+from tactileq.analysis.chapters.confusions.figure import figure_confusion, figure_similarities
+from tactileq.analysis.chapters.confusions.information import transferred_information
+from tactileq.analysis.chapters.confusions.similarity_choice import (
     FEWEST_CLASSES,
     MOST_CLASSES,
     SimilarityChoice,
     similarity_choice,
 )
-from analysis.columns import MODEL, TEXTURE, P
-from analysis.labels import TASK_TITLES, sentence_case
-from analysis.page.outcomes import Outcome, Weight, described
-from analysis.page.page import Fold, Item, Picture, Table
-from analysis.page.sections import Section, of_task
-from analysis.statistics.compared_answers import models_of
-from analysis.statistics.confusion import (
+from tactileq.analysis.columns import MODEL, TEXTURE, P
+from tactileq.analysis.labels import TASK_TITLES, sentence_case
+from tactileq.analysis.page.outcomes import Outcome, Weight, described
+from tactileq.analysis.page.page import Fold, Item, Picture, Table
+from tactileq.analysis.page.sections import Section, of_task
+from tactileq.analysis.statistics.compared_answers import models_of
+from tactileq.analysis.statistics.confusion import (
     CONFUSION_COLUMNS,
     ConfusionMatrix,
     confusion_matrices,
     confusion_table,
     participant_counts,
 )
-from modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
-from modeling.files.columns import Column, names, p_value
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
+from tactileq.modeling.files.columns import Column, names, p_value
 
 ALPHA = 0.05
 INFORMATION_COLUMNS = (

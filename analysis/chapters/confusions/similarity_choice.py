@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special, stats
 
-from analysis.chapters.confusions.information import check_counts
-from modeling import InputError
-from modeling.arrays import Floats
+from tactileq.analysis.chapters.confusions.information import check_counts
+from tactileq.modeling import InputError
+from tactileq.modeling.arrays import Floats
 
 FEWEST_CLASSES, MOST_CLASSES = 3, 16
 SIMULATIONS = 199

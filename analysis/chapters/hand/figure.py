@@ -6,7 +6,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.page.drawing import (
+from tactileq.analysis.page.drawing import (
     BLACK,
     BLUE,
     GREY,
@@ -16,7 +16,7 @@ from analysis.page.drawing import (
     shared_legend,
     stamp_if_simulated,
 )
-from analysis.statistics.paired import t_test, why_undefined
+from tactileq.analysis.statistics.paired import t_test, why_undefined
 
 LABELS = {
     "speed_mm_s": "mean speed while touching (mm/s)",
@@ -35,7 +35,7 @@ def figure_hand(means: pd.DataFrame, *, models: tuple[str, str], simulated: bool
     Parameters
     ----------
     means : DataFrame
-        From `analysis.chapters.hand.statistics.hand_means`, of one task.
+        From `tactileq.analysis.chapters.hand.statistics.hand_means`, of one task.
     models : (str, str)
         The reference, and the other one.
     simulated : bool

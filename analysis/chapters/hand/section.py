@@ -11,20 +11,20 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.chapters.chapter import Answered
-from analysis.chapters.hand.figure import figure_hand
-from analysis.chapters.hand.statistics import (
+from tactileq.analysis.chapters.chapter import Answered
+from tactileq.analysis.chapters.hand.figure import figure_hand
+from tactileq.analysis.chapters.hand.statistics import (
     HAND_PARTICIPANT_COLUMNS,
     HAND_TEST_COLUMNS,
     hand_by_participant,
     hand_means,
     hand_tests,
 )
-from analysis.labels import TASK_TITLES, signed
-from analysis.page.outcomes import Outcome, Weight
-from analysis.page.page import Fold, Picture, Table
-from analysis.page.sections import Section, of_pairs
-from modeling.files.columns import without
+from tactileq.analysis.labels import TASK_TITLES, signed
+from tactileq.analysis.page.outcomes import Outcome, Weight
+from tactileq.analysis.page.page import Fold, Picture, Table
+from tactileq.analysis.page.sections import Section, of_pairs
+from tactileq.modeling.files.columns import without
 
 ALPHA = 0.05
 TESTS_SHOWN = without(HAND_TEST_COLUMNS, "se_reference", "se_other")
@@ -58,7 +58,7 @@ def hand_section(
     Parameters
     ----------
     hand : DataFrame
-        From `analysis.answers.hand.load_hand`.
+        From `tactileq.analysis.answers.hand.load_hand`.
     models : (str, str)
         The reference, and the other one.
     rng : Generator

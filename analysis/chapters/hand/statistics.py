@@ -10,11 +10,11 @@ from dataclasses import asdict
 import numpy as np
 import pandas as pd
 
-from analysis.answers.hand import HAND_MEASURES
-from analysis.columns import P
-from analysis.statistics.draws import generators
-from analysis.statistics.paired import paired_test
-from modeling.files.columns import Column, names
+from tactileq.analysis.answers.hand import HAND_MEASURES
+from tactileq.analysis.columns import P
+from tactileq.analysis.statistics.draws import generators
+from tactileq.analysis.statistics.paired import paired_test
+from tactileq.modeling.files.columns import Column, names
 
 _CELL = ["task", "measure", "participant_id"]
 
@@ -60,7 +60,7 @@ def hand_means(hand: pd.DataFrame, *, models: tuple[str, str]) -> pd.DataFrame:
     Parameters
     ----------
     hand : DataFrame
-        From `analysis.answers.hand.load_hand`.
+        From `tactileq.analysis.answers.hand.load_hand`.
     models : (str, str)
         The reference, and the other one.
 

@@ -7,18 +7,18 @@ from dataclasses import replace
 
 import pandas as pd
 
-from analysis.chapters.chapter import LEAD, NOBODY_ASKED, Modelled
-from analysis.labels import IDENTICAL, MODELS, names_or_none, signed
-from analysis.page.outcomes import Outcome, Weight, described
-from analysis.page.page import Fold, Item, Picture, Table
-from analysis.page.sections import Headline, Section
-from analysis.spectra.comparison import compare_spectra
-from analysis.spectra.figures.layers_over_speed import figure_layers_over_speed
-from analysis.spectra.figures.spectra import figure_spectra_and_threshold
-from analysis.spectra.layers_over_grid import layers_over_speed
-from analysis.textures.between import LEFT_OUT_COLUMNS, left_out_summary
-from analysis.textures.likeness import GFC_COLUMNS
-from analysis.textures.results import (
+from tactileq.analysis.chapters.chapter import LEAD, NOBODY_ASKED, Modelled
+from tactileq.analysis.labels import IDENTICAL, MODELS, names_or_none, signed
+from tactileq.analysis.page.outcomes import Outcome, Weight, described
+from tactileq.analysis.page.page import Fold, Item, Picture, Table
+from tactileq.analysis.page.sections import Headline, Section
+from tactileq.analysis.spectra.comparison import compare_spectra
+from tactileq.analysis.spectra.figures.layers_over_speed import figure_layers_over_speed
+from tactileq.analysis.spectra.figures.spectra import figure_spectra_and_threshold
+from tactileq.analysis.spectra.layers_over_grid import layers_over_speed
+from tactileq.analysis.textures.between import LEFT_OUT_COLUMNS, left_out_summary
+from tactileq.analysis.textures.likeness import GFC_COLUMNS
+from tactileq.analysis.textures.results import (
     LAYER_VERDICT_COLUMNS,
     MODEL_FIT_COLUMNS,
     TextureResult,
@@ -26,9 +26,9 @@ from analysis.textures.results import (
     reference_condition,
     simplification_table,
 )
-from modeling.errors import counted
-from modeling.files.columns import chosen, without
-from modeling.files.writing import file_stem
+from tactileq.modeling.errors import counted
+from tactileq.modeling.files.columns import chosen, without
+from tactileq.modeling.files.writing import file_stem
 
 GFC_SHOWN = without(GFC_COLUMNS, "conditions", "gfc30_deficit")
 GFC_CAUTION = (
@@ -59,7 +59,7 @@ def model_section(textures: Sequence[TextureResult], gfc: pd.DataFrame) -> Secti
     textures : sequence of TextureResult
         At least one.
     gfc : DataFrame
-        `analysis.textures.likeness.gfc_table` of all of them.
+        `tactileq.analysis.textures.likeness.gfc_table` of all of them.
     """
     example = _example(textures)
     folds = [

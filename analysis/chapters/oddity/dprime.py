@@ -12,8 +12,8 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri
 
-from modeling import InputError
-from modeling.participants.choices import m_afc_share, oddity_share
+from tactileq.modeling import InputError
+from tactileq.modeling.participants.choices import m_afc_share, oddity_share
 
 HIGHEST = 20.0  # where all shares are 1 to the last digit
 Model = Callable[[float], float]

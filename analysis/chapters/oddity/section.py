@@ -11,20 +11,20 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.answers.responses import Responses
-from analysis.chapters.chapter import Answered, who_took_part
-from analysis.chapters.oddity.dprime import d_primes, oddity_d_prime
-from analysis.columns import TEXTURE
-from analysis.labels import ALL_TEXTURES, TASK_TITLES, sentence_case
-from analysis.page.outcomes import Outcome, Weight
-from analysis.page.page import Table
-from analysis.page.sections import Section, of_task
-from analysis.statistics.claims import NO_TEST
-from analysis.statistics.compared_answers import is_oddity
-from analysis.statistics.verdicts import ClaimFound
-from modeling.files.answer_tables import AnswerTable
-from modeling.files.columns import Column, names
-from modeling.participants.choices import ODDITY
+from tactileq.analysis.answers.responses import Responses
+from tactileq.analysis.chapters.chapter import Answered, who_took_part
+from tactileq.analysis.chapters.oddity.dprime import d_primes, oddity_d_prime
+from tactileq.analysis.columns import TEXTURE
+from tactileq.analysis.labels import ALL_TEXTURES, TASK_TITLES, sentence_case
+from tactileq.analysis.page.outcomes import Outcome, Weight
+from tactileq.analysis.page.page import Table
+from tactileq.analysis.page.sections import Section, of_task
+from tactileq.analysis.statistics.claims import NO_TEST
+from tactileq.analysis.statistics.compared_answers import is_oddity
+from tactileq.analysis.statistics.verdicts import ClaimFound
+from tactileq.modeling.files.answer_tables import AnswerTable
+from tactileq.modeling.files.columns import Column, names
+from tactileq.modeling.participants.choices import ODDITY
 
 ODDITY_COLUMNS = (
     Column("claim", is_name=True),

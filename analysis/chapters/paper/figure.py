@@ -7,7 +7,7 @@ from textwrap import fill
 
 from matplotlib.figure import Figure
 
-from analysis.chapters.paper.findings import (
+from tactileq.analysis.chapters.paper.findings import (
     CONTRADICTED,
     NOT_COMPARABLE,
     OPEN,
@@ -15,7 +15,7 @@ from analysis.chapters.paper.findings import (
     REPLICATED,
     PaperFinding,
 )
-from analysis.page.drawing import BLACK, BLUE, GREY, ORANGE, VERMILLION
+from tactileq.analysis.page.drawing import BLACK, BLUE, GREY, ORANGE, VERMILLION
 
 # Distinguished by shape as well as by colour.
 MARKS = {

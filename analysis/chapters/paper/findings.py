@@ -14,14 +14,14 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.labels import MODELS, unit_of
-from analysis.statistics.compared_answers import chance_of
-from analysis.statistics.equivalence import EQUAL_ON_AVERAGE, EQUIVALENT
-from analysis.statistics.paired import mean, t_interval
-from analysis.statistics.verdicts import ClaimFound
-from modeling.arrays import Floats
-from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.columns import Column
+from tactileq.analysis.labels import MODELS, unit_of
+from tactileq.analysis.statistics.compared_answers import chance_of
+from tactileq.analysis.statistics.equivalence import EQUAL_ON_AVERAGE, EQUIVALENT
+from tactileq.analysis.statistics.paired import mean, t_interval
+from tactileq.analysis.statistics.verdicts import ClaimFound
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.files.columns import Column
 
 Outcome = Literal["replicated", "contradicted", "open", "not comparable"]
 REPLICATED: Outcome = "replicated"
@@ -128,9 +128,9 @@ def of_models(centroids: pd.DataFrame, gfc: pd.DataFrame) -> list[PaperFinding]:
     Parameters
     ----------
     centroids : DataFrame
-        `analysis.textures.regressions.centroid_table`.
+        `tactileq.analysis.textures.regressions.centroid_table`.
     gfc : DataFrame
-        `analysis.textures.likeness.gfc_table`.
+        `tactileq.analysis.textures.likeness.gfc_table`.
     """
     findings: list[PaperFinding] = []
     for row in centroids.to_dict("records"):

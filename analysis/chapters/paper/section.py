@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from math import isfinite
 
-from analysis.chapters.chapter import Answered, Modelled
-from analysis.chapters.paper.figure import figure_findings
-from analysis.chapters.paper.findings import (
+from tactileq.analysis.chapters.chapter import Answered, Modelled
+from tactileq.analysis.chapters.paper.figure import figure_findings
+from tactileq.analysis.chapters.paper.findings import (
     CONTRADICTED,
     FINDING_COLUMNS,
     PaperFinding,
@@ -18,10 +18,10 @@ from analysis.chapters.paper.findings import (
     of_answers,
     of_models,
 )
-from analysis.page.outcomes import described
-from analysis.page.page import Picture, Table
-from analysis.page.sections import Section
-from analysis.textures.regressions import centroid_table
+from tactileq.analysis.page.outcomes import described
+from tactileq.analysis.page.page import Picture, Table
+from tactileq.analysis.page.sections import Section
+from tactileq.analysis.textures.regressions import centroid_table
 
 LEFT_OPEN = (
     " Last column: the smallest difference that a paired t-test with as many participants as the "

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.page.drawing import (
+from tactileq.analysis.page.drawing import (
     GREY,
     axes_or_new,
     finish_axes,
@@ -15,7 +15,7 @@ from analysis.page.drawing import (
     shared_legend,
     stamp_if_simulated,
 )
-from analysis.textures.regressions import CentroidOverSpeed
+from tactileq.analysis.textures.regressions import CentroidOverSpeed
 
 
 def figure_centroid(courses: Sequence[CentroidOverSpeed]) -> Figure:

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from analysis.chapters.chapter import Modelled
-from analysis.chapters.parameters.figure import figure_centroid
-from analysis.labels import ALL_TEXTURES
-from analysis.page.outcomes import described
-from analysis.page.page import Fold, Item, Picture, Table
-from analysis.page.sections import Section
-from analysis.textures.regressions import (
+from tactileq.analysis.chapters.chapter import Modelled
+from tactileq.analysis.chapters.parameters.figure import figure_centroid
+from tactileq.analysis.labels import ALL_TEXTURES
+from tactileq.analysis.page.outcomes import described
+from tactileq.analysis.page.page import Fold, Item, Picture, Table
+from tactileq.analysis.page.sections import Section
+from tactileq.analysis.textures.regressions import (
     CENTROID_AMPLITUDE_COLUMNS,
     CENTROID_COLUMNS,
     COEFFICIENT_COLUMNS,
@@ -28,9 +28,9 @@ from analysis.textures.regressions import (
     regression_table,
     support_table,
 )
-from analysis.textures.results import TextureResult
-from modeling import TextureModel
-from modeling.files.columns import chosen
+from tactileq.analysis.textures.results import TextureResult
+from tactileq.modeling import TextureModel
+from tactileq.modeling.files.columns import chosen
 
 REGRESSIONS_SHOWN = chosen(
     REGRESSION_COLUMNS,
@@ -70,7 +70,7 @@ def parameter_section(textures: Sequence[TextureResult], driving: pd.DataFrame) 
     textures : sequence of TextureResult
         At least one.
     driving : DataFrame
-        `analysis.textures.regressions.driving_table` of all of them.
+        `tactileq.analysis.textures.regressions.driving_table` of all of them.
     """
     models = [result.model for result in textures]
     simulated = any(result.simulated for result in textures)

@@ -7,24 +7,24 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from analysis.chapters.chapter import Modelled
-from analysis.labels import ALL_LAYERS, signed
-from analysis.page.outcomes import described
-from analysis.page.page import Fold, Item, Picture, Table
-from analysis.page.sections import Section
-from analysis.spectra.figures.layers_over_speed import figure_layers_over_speed
-from analysis.spectra.layers_over_grid import layers_over_speed
-from analysis.textures.between import PLANTED_BETWEEN_COLUMNS, planted_between_table
-from analysis.textures.recovery import (
+from tactileq.analysis.chapters.chapter import Modelled
+from tactileq.analysis.labels import ALL_LAYERS, signed
+from tactileq.analysis.page.outcomes import described
+from tactileq.analysis.page.page import Fold, Item, Picture, Table
+from tactileq.analysis.page.sections import Section
+from tactileq.analysis.spectra.figures.layers_over_speed import figure_layers_over_speed
+from tactileq.analysis.spectra.layers_over_grid import layers_over_speed
+from tactileq.analysis.textures.between import PLANTED_BETWEEN_COLUMNS, planted_between_table
+from tactileq.analysis.textures.recovery import (
     PLANTED_LAYER_COLUMNS,
     PLANTED_TRUTH_COLUMNS,
     planted_layers_table,
     planted_truth_table,
 )
-from analysis.textures.results import TextureResult, reference_condition
-from modeling.errors import counted
-from modeling.files.columns import without
-from stimuli.planted.textures import TEXTURES
+from tactileq.analysis.textures.results import TextureResult, reference_condition
+from tactileq.modeling.errors import counted
+from tactileq.modeling.files.columns import without
+from tactileq.stimuli.planted.textures import TEXTURES
 
 
 def sections(modelled: Modelled) -> list[Section]:

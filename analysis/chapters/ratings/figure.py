@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from analysis.figures.answers import LEGEND_OF_BARS, plot_paired_bars
-from analysis.labels import SCALES
-from analysis.page.drawing import GREY, shared_legend
-from analysis.statistics.verdicts import ClaimFound
+from tactileq.analysis.figures.answers import LEGEND_OF_BARS, plot_paired_bars
+from tactileq.analysis.labels import SCALES
+from tactileq.analysis.page.drawing import GREY, shared_legend
+from tactileq.analysis.statistics.verdicts import ClaimFound
 
 
 def figure_ratings(found: Sequence[ClaimFound], *, simulated: bool) -> Figure:

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analysis.chapters.chapter import Answered, Stream, named_by, who_took_part
-from analysis.chapters.ratings.figure import figure_ratings
-from analysis.labels import MEASURES, TASK_TITLES, sentence_case
-from analysis.page.page import Picture
-from analysis.page.sections import Section, of_task
-from analysis.statistics.verdicts import ClaimFound, overall_row
-from modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
+from tactileq.analysis.chapters.chapter import Answered, Stream, named_by, who_took_part
+from tactileq.analysis.chapters.ratings.figure import figure_ratings
+from tactileq.analysis.labels import MEASURES, TASK_TITLES, sentence_case
+from tactileq.analysis.page.page import Picture
+from tactileq.analysis.page.sections import Section, of_task
+from tactileq.analysis.statistics.verdicts import ClaimFound, overall_row
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
 
 
 def applies(table: AnswerTable) -> bool:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.chapters.chapter import Answered
-from analysis.chapters.reliability.statistics import (
+from tactileq.analysis.chapters.chapter import Answered
+from tactileq.analysis.chapters.reliability.statistics import (
     AGREEMENT_COLUMNS,
     RATER_COLUMNS,
     SIGN_COLUMNS,
@@ -23,15 +23,15 @@ from analysis.chapters.reliability.statistics import (
     same_ratings,
     within_participant_sd,
 )
-from analysis.labels import SCALES, TASK_TITLES
-from analysis.page.outcomes import Outcome, Weight
-from analysis.page.page import Item, Table
-from analysis.page.sections import Section
-from analysis.statistics.compared_answers import chance_of
-from analysis.statistics.draws import generators
-from modeling.errors import counted
-from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.columns import Column, names
+from tactileq.analysis.labels import SCALES, TASK_TITLES
+from tactileq.analysis.page.outcomes import Outcome, Weight
+from tactileq.analysis.page.page import Item, Table
+from tactileq.analysis.page.sections import Section
+from tactileq.analysis.statistics.compared_answers import chance_of
+from tactileq.analysis.statistics.draws import generators
+from tactileq.modeling.errors import counted
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.files.columns import Column, names
 
 # Exploring two or more surfaces takes longer.
 FASTEST_S = 2.0

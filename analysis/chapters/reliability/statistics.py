@@ -13,10 +13,10 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.statistics.paired import ignoring_case, sign_flips_p
-from modeling.errors import counted
-from modeling.files.answer_tables import ENDS
-from modeling.files.columns import Column, names
+from tactileq.analysis.statistics.paired import ignoring_case, sign_flips_p
+from tactileq.modeling.errors import counted
+from tactileq.modeling.files.answer_tables import ENDS
+from tactileq.modeling.files.columns import Column, names
 
 ALPHA = 0.05
 LEAST_ANSWERS = 5  # fewer do not show how somebody answers

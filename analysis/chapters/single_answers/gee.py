@@ -12,13 +12,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.columns import TEXTURE, P
-from analysis.labels import ALL_TEXTURES
-from analysis.statistics.design import complete_participants, design
-from analysis.statistics.mixed import t_of
-from analysis.statistics.paired import sign_flips_p, without_rounding_noise
-from modeling.arrays import Floats
-from modeling.files.columns import Column, names
+from tactileq.analysis.columns import TEXTURE, P
+from tactileq.analysis.labels import ALL_TEXTURES
+from tactileq.analysis.statistics.design import complete_participants, design
+from tactileq.analysis.statistics.mixed import t_of
+from tactileq.analysis.statistics.paired import sign_flips_p, without_rounding_noise
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.files.columns import Column, names
 
 GEE, SIGN_FLIPS = "GEE", "sign flips"
 GEE_COLUMNS = (
@@ -91,7 +91,7 @@ def gee_effects(
     Parameters
     ----------
     answers : DataFrame
-        As in `analysis.statistics.design.design`, textures with identical models left out.
+        As in `tactileq.analysis.statistics.design.design`, textures with identical models left out.
     column : str
         Right or wrong, or a rating.
     models : (str, str)

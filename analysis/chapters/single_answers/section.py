@@ -11,20 +11,20 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from analysis.answers.responses import Responses
-from analysis.chapters.chapter import Answered
-from analysis.chapters.single_answers.gee import GEE, GEE_COLUMNS, gee_effects
-from analysis.labels import SCALES
-from analysis.page.outcomes import Outcome, Weight
-from analysis.page.page import Table
-from analysis.page.sections import Section
-from analysis.statistics.compared_answers import answers_about
-from analysis.statistics.draws import generators
-from analysis.statistics.equivalence import ALPHA
-from analysis.statistics.mixed import MIXED_COLUMNS, mixed_effects
-from analysis.statistics.verdicts import ClaimFound
-from modeling.files.answer_tables import ANSWER_TABLES, ENDS
-from modeling.files.columns import Column, names, p_value
+from tactileq.analysis.answers.responses import Responses
+from tactileq.analysis.chapters.chapter import Answered
+from tactileq.analysis.chapters.single_answers.gee import GEE, GEE_COLUMNS, gee_effects
+from tactileq.analysis.labels import SCALES
+from tactileq.analysis.page.outcomes import Outcome, Weight
+from tactileq.analysis.page.page import Table
+from tactileq.analysis.page.sections import Section
+from tactileq.analysis.statistics.compared_answers import answers_about
+from tactileq.analysis.statistics.draws import generators
+from tactileq.analysis.statistics.equivalence import ALPHA
+from tactileq.analysis.statistics.mixed import MIXED_COLUMNS, mixed_effects
+from tactileq.analysis.statistics.verdicts import ClaimFound
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES, ENDS
+from tactileq.modeling.files.columns import Column, names, p_value
 
 CLAIM = Column("claim", is_name=True)
 CLAIM_MIXED_COLUMNS = (CLAIM, *MIXED_COLUMNS)

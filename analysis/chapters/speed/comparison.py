@@ -10,14 +10,14 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from analysis.chapters.speed.scores import judged_with_all, participant_scores, timed_answers
-from analysis.columns import MODEL, P
-from analysis.statistics.mixed import mixed_effects
-from analysis.statistics.paired import (
+from tactileq.analysis.chapters.speed.scores import judged_with_all, participant_scores, timed_answers
+from tactileq.analysis.columns import MODEL, P
+from tactileq.analysis.statistics.mixed import mixed_effects
+from tactileq.analysis.statistics.paired import (
     paired_test,
 )
-from modeling.arrays import Floats
-from modeling.files.columns import Column, names
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.files.columns import Column, names
 
 SPEED_MEASURES = {
     "time_s": "response time (s, geometric mean)",
@@ -171,7 +171,7 @@ def time_ratios(
     Returns
     -------
     DataFrame
-        `TIME_RATIO_COLUMNS`, a row for each term of `analysis.statistics.mixed.mixed_effects`.
+        `TIME_RATIO_COLUMNS`, a row for each term of `tactileq.analysis.statistics.mixed.mixed_effects`.
     """
     own = judged_with_all(answers, models)
     logs = own.assign(log_time=np.log(own["response_time_s"]))

@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
-from analysis.figures.answers import ROLE_COLOURS
-from analysis.page.drawing import (
+from tactileq.analysis.figures.answers import ROLE_COLOURS
+from tactileq.analysis.page.drawing import (
     BLACK,
     GREY,
     axes_or_new,
@@ -36,7 +36,7 @@ def figure_speed_accuracy(
     Parameters
     ----------
     scores : DataFrame
-        From `analysis.chapters.speed.scores.participant_scores`.
+        From `tactileq.analysis.chapters.speed.scores.participant_scores`.
     means : DataFrame
         From `score_means` of these.
     models : sequence of str
@@ -117,7 +117,7 @@ def figure_conditional_accuracy(
     Parameters
     ----------
     table : DataFrame
-        From `analysis.chapters.speed.scores.conditional_accuracy`.
+        From `tactileq.analysis.chapters.speed.scores.conditional_accuracy`.
     models : sequence of str
         One, or the reference and the other one.
     chance : float, optional

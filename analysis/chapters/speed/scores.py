@@ -10,16 +10,16 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from analysis.columns import MODEL, TEXTURE
-from analysis.statistics.paired import (
+from tactileq.analysis.columns import MODEL, TEXTURE
+from tactileq.analysis.statistics.paired import (
     ignoring_case,
     t_test,
     why_undefined,
     without_rounding_noise,
 )
-from modeling import InputError
-from modeling.arrays import Floats
-from modeling.files.columns import Column, names
+from tactileq.modeling import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.files.columns import Column, names
 
 PARTICIPANT = Column("participant_id", "participant", is_name=True)
 TEXTURE_TIME_COLUMNS = (

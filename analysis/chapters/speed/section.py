@@ -10,8 +10,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import pandas as pd
 
-from analysis.chapters.chapter import Answered, Stream
-from analysis.chapters.speed.comparison import (
+from tactileq.analysis.chapters.chapter import Answered, Stream
+from tactileq.analysis.chapters.speed.comparison import (
     RIGHT_WRONG_COLUMNS,
     SPEED_COMPARISON_COLUMNS,
     SPEED_MEASURES,
@@ -20,8 +20,8 @@ from analysis.chapters.speed.comparison import (
     right_and_wrong,
     time_ratios,
 )
-from analysis.chapters.speed.figure import figure_conditional_accuracy, figure_speed_accuracy
-from analysis.chapters.speed.scores import (
+from tactileq.analysis.chapters.speed.figure import figure_conditional_accuracy, figure_speed_accuracy
+from tactileq.analysis.chapters.speed.scores import (
     CONDITIONAL_COLUMNS,
     SCORE_COLUMNS,
     TEXTURE_TIME_COLUMNS,
@@ -30,14 +30,14 @@ from analysis.chapters.speed.scores import (
     score_means,
     speed_and_accuracy,
 )
-from analysis.labels import TASK_TITLES, sentence_case
-from analysis.page.outcomes import Outcome, Weight
-from analysis.page.page import Fold, Item, Picture, Table
-from analysis.page.sections import Section, of_pairs
-from analysis.statistics.compared_answers import chance_of, holding_both
-from analysis.statistics.equivalence import ALPHA
-from modeling.errors import counted
-from modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
+from tactileq.analysis.labels import TASK_TITLES, sentence_case
+from tactileq.analysis.page.outcomes import Outcome, Weight
+from tactileq.analysis.page.page import Fold, Item, Picture, Table
+from tactileq.analysis.page.sections import Section, of_pairs
+from tactileq.analysis.statistics.compared_answers import chance_of, holding_both
+from tactileq.analysis.statistics.equivalence import ALPHA
+from tactileq.modeling.errors import counted
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
 
 BOTH = "both models in each trial"
 # Title, note and columns of the tables behind the pictures.

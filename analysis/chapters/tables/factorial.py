@@ -15,11 +15,11 @@ import numpy as np
 import pandas as pd
 from scipy import linalg, stats
 
-from analysis.columns import P
-from analysis.statistics.paired import CONFIDENCE, holm, paired_test, t_interval
-from modeling import InputError
-from modeling.arrays import Floats
-from modeling.files.columns import Column
+from tactileq.analysis.columns import P
+from tactileq.analysis.statistics.paired import CONFIDENCE, holm, paired_test, t_interval
+from tactileq.modeling import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.files.columns import Column
 
 EFFECT = Column("effect", is_name=True)
 ANOVA_COLUMNS = (

@@ -10,7 +10,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.page.drawing import (
+from tactileq.analysis.page.drawing import (
     BLACK,
     BLUE,
     GREY,

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.answers.imported import ImportedAnswers
-from analysis.chapters.tables.factorial import (
+from tactileq.analysis.answers.imported import ImportedAnswers
+from tactileq.analysis.chapters.tables.factorial import (
     ANOVA_COLUMNS,
     CONDITION_COLUMNS,
     PAIR_COLUMNS,
@@ -24,14 +24,14 @@ from analysis.chapters.tables.factorial import (
     participant_cells,
     repeated_measures_anova,
 )
-from analysis.chapters.tables.figure import figure_factorial
-from analysis.figures.confusions import plot_confusion
-from analysis.page.outcomes import Outcome, Weight
-from analysis.page.page import Fold, Picture, Table
-from analysis.page.sections import Headline, Section
-from analysis.statistics.confusion import CONFUSION_COLUMNS, ConfusionMatrix, confusion_table
-from modeling.errors import counted
-from modeling.files.columns import p_value
+from tactileq.analysis.chapters.tables.figure import figure_factorial
+from tactileq.analysis.figures.confusions import plot_confusion
+from tactileq.analysis.page.outcomes import Outcome, Weight
+from tactileq.analysis.page.page import Fold, Picture, Table
+from tactileq.analysis.page.sections import Headline, Section
+from tactileq.analysis.statistics.confusion import CONFUSION_COLUMNS, ConfusionMatrix, confusion_table
+from tactileq.modeling.errors import counted
+from tactileq.modeling.files.columns import p_value
 
 ALPHA = 0.05
 WORDS = {"correct": "accuracy", "value": "mean"}

@@ -8,14 +8,14 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from analysis.answers.responses import Responses
-from analysis.chapters.chapter import Answered, who_took_part
-from analysis.labels import TASK_TITLES, sentence_case
-from analysis.page.page import Table
-from analysis.page.sections import Section
-from analysis.statistics.compared_answers import is_oddity
-from modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
-from modeling.files.columns import Column, names
+from tactileq.analysis.answers.responses import Responses
+from tactileq.analysis.chapters.chapter import Answered, who_took_part
+from tactileq.analysis.labels import TASK_TITLES, sentence_case
+from tactileq.analysis.page.page import Table
+from tactileq.analysis.page.sections import Section
+from tactileq.analysis.statistics.compared_answers import is_oddity
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
+from tactileq.modeling.files.columns import Column, names
 
 ASKED_COLUMNS = (
     Column("what", " ", is_name=True),

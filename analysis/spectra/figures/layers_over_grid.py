@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
-from analysis.page.drawing import (
+from tactileq.analysis.page.drawing import (
     BLACK,
     GREY,
     axes_or_new,
@@ -16,8 +16,8 @@ from analysis.page.drawing import (
     series_style,
     stamp_if_simulated,
 )
-from analysis.spectra.layers_over_grid import LayersOverGrid
-from modeling.arrays import Bools
+from tactileq.analysis.spectra.layers_over_grid import LayersOverGrid
+from tactileq.modeling.arrays import Bools
 
 QUANTITIES = ("frequency_hz", "amplitude")
 # Marker, filling, size and meaning of the marks on points that are no measurements.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.page.drawing import (
+from tactileq.analysis.page.drawing import (
     BLACK,
     axes_or_new,
     finish_axes,
@@ -15,8 +15,8 @@ from analysis.page.drawing import (
     shared_legend,
     stamp_if_simulated,
 )
-from analysis.spectra.layers_over_grid import LayersOverSpeed
-from modeling.arrays import Floats
+from tactileq.analysis.spectra.layers_over_grid import LayersOverSpeed
+from tactileq.modeling.arrays import Floats
 
 
 def figure_layers_over_speed(courses: Sequence[LayersOverSpeed]) -> Figure:

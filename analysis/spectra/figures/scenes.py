@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter, NullLocator, ScalarFormatter
 
-from analysis.page.drawing import (
+from tactileq.analysis.page.drawing import (
     BLACK,
     GREY,
     LAYER_COLOURS,
@@ -21,8 +21,8 @@ from analysis.page.drawing import (
     series_style,
     stamp_if_simulated,
 )
-from modeling import CompiledScene
-from modeling.scenes.compiled import CompiledTexture
+from tactileq.modeling import CompiledScene
+from tactileq.modeling.scenes.compiled import CompiledTexture
 
 Cost = Literal["operations", "bytes"]
 LABELS: dict[Cost, str] = {

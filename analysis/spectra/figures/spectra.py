@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
-from analysis.labels import MODELS
-from analysis.page.drawing import (
+from tactileq.analysis.labels import MODELS
+from tactileq.analysis.page.drawing import (
     BLACK,
     BLUE,
     GREEN,
@@ -23,9 +23,9 @@ from analysis.page.drawing import (
     shared_legend,
     stamp_if_simulated,
 )
-from analysis.spectra.comparison import SpectrumComparison, SpectrumPanel
-from modeling.errors import counted
-from modeling.recordings.spectrum import HIGH_PASS_HZ
+from tactileq.analysis.spectra.comparison import SpectrumComparison, SpectrumPanel
+from tactileq.modeling.errors import counted
+from tactileq.modeling.recordings.spectrum import HIGH_PASS_HZ
 
 PANELS_IN_A_ROW = 3
 JUST_FELT_DASHES = (0, (1.2, 0.5))  # dense, since these lines are short

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.page.drawing import (
+from tactileq.analysis.page.drawing import (
     BLACK,
     BLUE,
     LAYER_COLOURS,
@@ -16,7 +16,7 @@ from analysis.page.drawing import (
     shared_legend,
     stamp_if_simulated,
 )
-from analysis.spectra.contact_sheet import LINE_HZ, ContactSheet
+from tactileq.analysis.spectra.contact_sheet import LINE_HZ, ContactSheet
 
 COLOURS = (BLUE, ORANGE, *LAYER_COLOURS[1:4], *LAYER_COLOURS[5:])
 DASHES = ("-", "--", ":", "-.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.page.drawing import (
+from tactileq.analysis.page.drawing import (
     BLACK,
     BLUE,
     GREEN,
@@ -18,7 +18,7 @@ from analysis.page.drawing import (
     shared_legend,
     stamp_if_simulated,
 )
-from analysis.spectra.vibrator import CompensatedVibrator
+from tactileq.analysis.spectra.vibrator import CompensatedVibrator
 
 MISTUNED_STYLES = ((ORANGE, (0, (5, 2))), (VERMILLION, (0, (1, 1))), (GREEN, "-."))
 LOWEST_DB, HIGHEST_DB = -30.0, 20.0

@@ -10,16 +10,16 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import ndtri
 
-from analysis.statistics.participants.mixture import MixtureOfEffects
-from modeling.arrays import Bools, Floats
-from modeling.participants.choices import (
+from tactileq.analysis.statistics.participants.mixture import MixtureOfEffects
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.participants.choices import (
     ChoicePriors,
     ChoiceStudies,
     DecisionModel,
     StudyPeople,
     mean_effect,
 )
-from modeling.participants.effects import COMPONENTS, EffectMixture, drawn_places
+from tactileq.modeling.participants.effects import COMPONENTS, EffectMixture, drawn_places
 
 _ACCEPTED = 0.35  # share of accepted proposals that steps are adapted to
 _TINY = 1e-12

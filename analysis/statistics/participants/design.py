@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from modeling.arrays import Floats, Integers
-from modeling.participants.choices import ChoiceStudies, DecisionModel
-from modeling.participants.ratings import RatingStudies
+from tactileq.modeling.arrays import Floats, Integers
+from tactileq.modeling.participants.choices import ChoiceStudies, DecisionModel
+from tactileq.modeling.participants.ratings import RatingStudies
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from modeling.arrays import Bools, Floats, Integers
-from modeling.participants.effects import (
+from tactileq.modeling.arrays import Bools, Floats, Integers
+from tactileq.modeling.participants.effects import (
     COMPONENTS,
     EffectMixture,
     EffectPriors,

@@ -10,12 +10,12 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from analysis.statistics.participants.choices import ChoiceSampler
-from analysis.statistics.participants.design import axis_of_studies
-from analysis.statistics.participants.ratings import RatingSampler
-from modeling.arrays import Bools, Floats
-from modeling.participants.choices import ChoicePriors, ChoiceStudies, DecisionModel
-from modeling.participants.ratings import RatingPriors, RatingStudies
+from tactileq.analysis.statistics.participants.choices import ChoiceSampler
+from tactileq.analysis.statistics.participants.design import axis_of_studies
+from tactileq.analysis.statistics.participants.ratings import RatingSampler
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.participants.choices import ChoicePriors, ChoiceStudies, DecisionModel
+from tactileq.modeling.participants.ratings import RatingPriors, RatingStudies
 
 UNSEEN = 0.5  # of the Jeffreys prior of a share of people
 Bounds = tuple[float, float]

@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import gammaln, ndtr, ndtri
 
-from analysis.statistics.participants.mixture import MixtureOfEffects, vague_mean
-from modeling.arrays import Bools, Floats
-from modeling.participants.effects import EffectMixture
-from modeling.participants.ratings import (
+from tactileq.analysis.statistics.participants.mixture import MixtureOfEffects, vague_mean
+from tactileq.modeling.arrays import Bools, Floats
+from tactileq.modeling.participants.effects import EffectMixture
+from tactileq.modeling.participants.ratings import (
     AT_END,
     HIGHEST,
     LOWEST,

@@ -12,8 +12,8 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from analysis.columns import TEXTURE
-from analysis.statistics.equivalence import (
+from tactileq.analysis.columns import TEXTURE
+from tactileq.analysis.statistics.equivalence import (
     ALL_BUT,
     ALPHA,
     AVERAGE_FELT,
@@ -23,18 +23,18 @@ from analysis.statistics.equivalence import (
     INCONCLUSIVE,
     Bounds,
 )
-from analysis.statistics.participants.design import PeopleData, first_people, side_by_side
-from analysis.statistics.participants.posterior import (
+from tactileq.analysis.statistics.participants.design import PeopleData, first_people, side_by_side
+from tactileq.analysis.statistics.participants.posterior import (
     Draws,
     Effort,
     choice_draws,
     r_hat,
     rating_draws,
 )
-from modeling.arrays import Floats
-from modeling.files.columns import Column, names
-from modeling.participants.choices import ChoicePriors, ChoiceStudies, DecisionModel
-from modeling.participants.ratings import RatingPriors, RatingStudies
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.files.columns import Column, names
+from tactileq.modeling.participants.choices import ChoicePriors, ChoiceStudies, DecisionModel
+from tactileq.modeling.participants.ratings import RatingPriors, RatingStudies
 
 FEWEST = 8  # participants
 LIKELY = 0.5  # probability above which somebody is said to be outside the bounds, or careless

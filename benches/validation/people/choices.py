@@ -15,7 +15,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from benches.validation.people.drawn import (
+from tactileq.benches.validation.people.drawn import (
     BOUNDS,
     CHOICE_KIND,
     N_TEXTURES,
@@ -28,7 +28,7 @@ from benches.validation.people.drawn import (
     normal_quantiles,
     shuffled,
 )
-from modeling.arrays import Floats
+from tactileq.modeling.arrays import Floats
 
 CHANCE_OF_THREE, CHANCE_OF_SEVEN = 1 / 3, 1 / N_TEXTURES
 CARELESS, LAPSES = 0.2, 0.1  # shares of people, and of trials

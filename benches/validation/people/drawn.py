@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling.arrays import Floats
+from tactileq.modeling.arrays import Floats
 
 Shape = tuple[int, int]  # studies, people
 

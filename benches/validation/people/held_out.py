@@ -15,7 +15,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from benches.validation.people.drawn import (
+from tactileq.benches.validation.people.drawn import (
     BOUNDS,
     CHOICE_KIND,
     N_TEXTURES,
@@ -29,7 +29,7 @@ from benches.validation.people.drawn import (
     on_slider,
     shuffled,
 )
-from modeling.arrays import Floats
+from tactileq.modeling.arrays import Floats
 
 Integers = NDArray[np.intp]
 

@@ -13,7 +13,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from benches.validation.people.drawn import (
+from tactileq.benches.validation.people.drawn import (
     BOUNDS,
     N_TEXTURES,
     RATING_KIND,
@@ -23,7 +23,7 @@ from benches.validation.people.drawn import (
     on_slider,
     shuffled,
 )
-from modeling.arrays import Floats
+from tactileq.modeling.arrays import Floats
 
 BASE = 60.0  # mean latent rating of the reference
 PERSON_SD, TEXTURE_SD, CELL_SD = 8.0, 6.0, 4.0  # of people, textures and people × textures

@@ -10,15 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from benches.validation.people.choices import CHOICE_SITUATIONS, ODDITY_SITUATIONS
-from benches.validation.people.drawn import (
+from tactileq.benches.validation.people.choices import CHOICE_SITUATIONS, ODDITY_SITUATIONS
+from tactileq.benches.validation.people.drawn import (
     CHOICE_KIND,
     ODDITY_KIND,
     RATING_KIND,
     DrawnStudies,
     Situation,
 )
-from benches.validation.people.ratings import RATING_SITUATIONS
+from tactileq.benches.validation.people.ratings import RATING_SITUATIONS
 
 __all__ = ["CHOICE_KIND", "ODDITY_KIND", "RATING_KIND", "SITUATIONS", "DrawnStudies", "Situation"]
 

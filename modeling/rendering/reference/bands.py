@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from modeling.equalizer.bands import band_coefficients, clamp_bands
-from modeling.hand import Hand
-from modeling.rendering.noise import white_noise
-from modeling.rendering.plan import LayeredModel, RenderPlan
-from modeling.rendering.reference.hand import GainRamps
+from tactileq.modeling.equalizer.bands import band_coefficients, clamp_bands
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.rendering.noise import white_noise
+from tactileq.modeling.rendering.plan import LayeredModel, RenderPlan
+from tactileq.modeling.rendering.reference.hand import GainRamps
 
 
 class BandFilter:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from modeling.equalizer.bands import band_coefficients
-from modeling.rendering.plan import RenderPlan
+from tactileq.modeling.equalizer.bands import band_coefficients
+from tactileq.modeling.rendering.plan import RenderPlan
 
 
 class Compensator:

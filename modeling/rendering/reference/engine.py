@@ -13,13 +13,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.hand import Hand
-from modeling.rendering.plan import RenderCounters, RenderPlan
-from modeling.rendering.reference.compensator import Compensator
-from modeling.rendering.reference.hand import Extrapolator
-from modeling.rendering.reference.interpolator import Interpolator
-from modeling.rendering.reference.limiter import Limiter
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.rendering.plan import RenderCounters, RenderPlan
+from tactileq.modeling.rendering.reference.compensator import Compensator
+from tactileq.modeling.rendering.reference.hand import Extrapolator
+from tactileq.modeling.rendering.reference.interpolator import Interpolator
+from tactileq.modeling.rendering.reference.limiter import Limiter
 
 
 class StreamFilter(Protocol):

@@ -10,9 +10,9 @@ from math import isfinite
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.hand import Hand
-from modeling.rendering.plan import RenderPlan
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.rendering.plan import RenderPlan
 
 _SMALLEST_SHARE = 1e-9
 # A reading that is no later after the last one, in samples, does not count.

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from modeling.arrays import Floats
-from modeling.rendering.plan import RenderPlan
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.rendering.plan import RenderPlan
 
 
 class Interpolator:

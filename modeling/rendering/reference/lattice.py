@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from modeling.hand import Hand
-from modeling.models.ar_model import ARModel
-from modeling.models.line_spectral import prediction_coefficients, reflection_coefficients
-from modeling.rendering.noise import white_noise
-from modeling.rendering.plan import RenderPlan
-from modeling.rendering.reference.hand import GainRamps
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.models.ar_model import ARModel
+from tactileq.modeling.models.line_spectral import prediction_coefficients, reflection_coefficients
+from tactileq.modeling.rendering.noise import white_noise
+from tactileq.modeling.rendering.plan import RenderPlan
+from tactileq.modeling.rendering.reference.hand import GainRamps
 
 # Rounding must not put a pole on the unit circle.
 _HIGHEST_REFLECTION = 1 - 1e-12

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from modeling.rendering.plan import RenderPlan
+from tactileq.modeling.rendering.plan import RenderPlan
 
 
 class Limiter:

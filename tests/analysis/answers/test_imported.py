@@ -8,8 +8,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from analysis.answers.imported import ImportedAnswers, load_imported, parse_map
-from modeling import InputError
+from tactileq.analysis.answers.imported import ImportedAnswers, load_imported, parse_map
+from tactileq.modeling import InputError
 from tests.refusals import refused
 
 

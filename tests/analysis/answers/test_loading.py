@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from analysis.answers.loading import load_responses
-from analysis.answers.responses import PlannedTask, Responses, leave_out
-from analysis.answers.setups import pool_setups
-from modeling import InputError
+from tactileq.analysis.answers.loading import load_responses
+from tactileq.analysis.answers.responses import PlannedTask, Responses, leave_out
+from tactileq.analysis.answers.setups import pool_setups
+from tactileq.modeling import InputError
 from tests.analysis.conftest import TEXTURES
 from tests.refusals import refused
 

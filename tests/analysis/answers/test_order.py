@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from analysis.answers.loading import load_responses
-from modeling import InputError
+from tactileq.analysis.answers.loading import load_responses
+from tactileq.modeling import InputError
 from tests.refusals import refused
 
 COLUMNS = (

@@ -12,11 +12,11 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import stats
 
-from analysis.answers.plan import Claim
-from analysis.labels import ALL_TEXTURES
-from analysis.statistics.caveats import Caveats
-from analysis.statistics.claims import Values, claim_tests, complete_means
-from analysis.statistics.rates import correct_rates
+from tactileq.analysis.answers.plan import Claim
+from tactileq.analysis.labels import ALL_TEXTURES
+from tactileq.analysis.statistics.caveats import Caveats
+from tactileq.analysis.statistics.claims import Values, claim_tests, complete_means
+from tactileq.analysis.statistics.rates import correct_rates
 
 FOLDER = Path(__file__).parents[2] / "data" / "hapticomm_3x3"
 TYPES = {"1": "slide", "2": "tap", "3": "tap and hold"}

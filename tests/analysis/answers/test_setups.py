@@ -8,11 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.answers.responses import PlannedTask, Responses, leave_out, setup_of
-from analysis.answers.setups import answers_at, pool_setups
-from analysis.statistics.described_verdicts import differences_by_setup
-from analysis.statistics.verdicts import claims_found
-from modeling import InputError
+from tactileq.analysis.answers.responses import PlannedTask, Responses, leave_out, setup_of
+from tactileq.analysis.answers.setups import answers_at, pool_setups
+from tactileq.analysis.statistics.described_verdicts import differences_by_setup
+from tactileq.analysis.statistics.verdicts import claims_found
+from tactileq.modeling import InputError
 from tests.refusals import refused
 
 

@@ -7,18 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.answers.loading import load_responses
-from analysis.answers.responses import PlannedTask, Responses
-from analysis.statistics.confusion import confusion_matrices
-from analysis.statistics.described_verdicts import incomplete
-from analysis.statistics.verdicts import claims_found
-from experiments.observers.whole_study import simulate_study
-from experiments.study.models import ModelSets
-from experiments.study.study import Study
-from experiments.study.task_plan import TaskPlan
-from modeling import Threshold, simplify
-from rig.twin import SimulatedRig
-from stimuli.planted.textures import planted_texture
+from tactileq.analysis.answers.loading import load_responses
+from tactileq.analysis.answers.responses import PlannedTask, Responses
+from tactileq.analysis.statistics.confusion import confusion_matrices
+from tactileq.analysis.statistics.described_verdicts import incomplete
+from tactileq.analysis.statistics.verdicts import claims_found
+from tactileq.experiments.observers.whole_study import simulate_study
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.study.task_plan import TaskPlan
+from tactileq.modeling import Threshold, simplify
+from tactileq.rig.twin import SimulatedRig
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 
 TEXTURES = ("leather", "MDF", "PVC")

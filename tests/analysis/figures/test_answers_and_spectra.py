@@ -11,25 +11,25 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from analysis.answers.responses import Responses
-from analysis.chapters.choices.figure import figure_correct_rates
-from analysis.chapters.claims.forest import figure_forest
-from analysis.chapters.confusions.figure import figure_confusion, figure_similarities
-from analysis.chapters.ratings.figure import figure_ratings
-from analysis.figures.answers import BAR_WIDTH, ROLE_COLOURS
-from analysis.page.drawing import LAYER_COLOURS, VERMILLION
-from analysis.spectra.comparison import compare_spectra, spectrum_panels
-from analysis.spectra.figures.layers_over_speed import figure_layers_over_speed
-from analysis.spectra.figures.spectra import (
+from tactileq.analysis.answers.responses import Responses
+from tactileq.analysis.chapters.choices.figure import figure_correct_rates
+from tactileq.analysis.chapters.claims.forest import figure_forest
+from tactileq.analysis.chapters.confusions.figure import figure_confusion, figure_similarities
+from tactileq.analysis.chapters.ratings.figure import figure_ratings
+from tactileq.analysis.figures.answers import BAR_WIDTH, ROLE_COLOURS
+from tactileq.analysis.page.drawing import LAYER_COLOURS, VERMILLION
+from tactileq.analysis.spectra.comparison import compare_spectra, spectrum_panels
+from tactileq.analysis.spectra.figures.layers_over_speed import figure_layers_over_speed
+from tactileq.analysis.spectra.figures.spectra import (
     figure_spectra,
     figure_spectra_and_threshold,
     plot_layers_and_threshold,
 )
-from analysis.spectra.layers_over_grid import layers_over_speed
-from analysis.statistics.confusion import confusion_matrices
-from analysis.statistics.verdicts import ClaimFound, claims_found
-from modeling import InputError, RecordingSet
-from modeling.fitting.conditions import recording_spectra
+from tactileq.analysis.spectra.layers_over_grid import layers_over_speed
+from tactileq.analysis.statistics.confusion import confusion_matrices
+from tactileq.analysis.statistics.verdicts import ClaimFound, claims_found
+from tactileq.modeling import InputError, RecordingSet
+from tactileq.modeling.fitting.conditions import recording_spectra
 from tests.refusals import refused
 
 pytestmark = pytest.mark.filterwarnings("error")

@@ -7,7 +7,7 @@ import re
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.page.page import (
+from tactileq.analysis.page.page import (
     LONGEST_WORD_KEPT_WHOLE,
     MOST_ROWS,
     PIXELS_PER_INCH,
@@ -18,7 +18,7 @@ from analysis.page.page import (
     picture_html,
     table_html,
 )
-from modeling.files.columns import Column
+from tactileq.modeling.files.columns import Column
 
 
 def classes(frame: pd.DataFrame, *columns: Column) -> list[list[str]]:

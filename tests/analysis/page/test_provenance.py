@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from analysis.page.page import table_html
-from analysis.page.provenance import provenance_table, unfolded
+from tactileq.analysis.page.page import table_html
+from tactileq.analysis.page.provenance import provenance_table, unfolded
 
 HASH = "0123456789abcdef" * 4
 

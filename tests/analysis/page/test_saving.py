@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.text import Text
 
-from analysis.page import saving
-from analysis.page.saving import DEFAULT_FAMILY, missing_fonts, png_of, save_figure, svg_of
+from tactileq.analysis.page import saving
+from tactileq.analysis.page.saving import DEFAULT_FAMILY, missing_fonts, png_of, save_figure, svg_of
 
 pytestmark = pytest.mark.filterwarnings("error")
 NAMES = ("木材", "나무", "ひのき")

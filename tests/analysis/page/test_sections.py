@@ -5,10 +5,10 @@ from __future__ import annotations
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.page.outcomes import Outcome, Weight
-from analysis.page.page import Fold, Picture, Table
-from analysis.page.sections import Section, of_pairs
-from modeling.files.columns import Column
+from tactileq.analysis.page.outcomes import Outcome, Weight
+from tactileq.analysis.page.page import Fold, Picture, Table
+from tactileq.analysis.page.sections import Section, of_pairs
+from tactileq.modeling.files.columns import Column
 
 
 def section(told: str) -> Section:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pandas as pd
 
-from analysis.labels import ALL_TEXTURES
-from analysis.power.figure import figure_power
-from analysis.power.power import EVERY_TEXTURE, Verdict, power_table
-from analysis.statistics.equivalence import EQUIVALENT, INCONCLUSIVE
+from tactileq.analysis.labels import ALL_TEXTURES
+from tactileq.analysis.power.figure import figure_power
+from tactileq.analysis.power.power import EVERY_TEXTURE, Verdict, power_table
+from tactileq.analysis.statistics.equivalence import EQUIVALENT, INCONCLUSIVE
 
 
 def table_of(claims: int) -> pd.DataFrame:

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.answers.plan import Claim
-from analysis.labels import ALL_TEXTURES
-from analysis.power.power import (
+from tactileq.analysis.answers.plan import Claim
+from tactileq.analysis.labels import ALL_TEXTURES
+from tactileq.analysis.power.power import (
     EVERY_TEXTURE,
     MEAN_ALONE,
     NO_VERDICT,
@@ -20,9 +20,9 @@ from analysis.power.power import (
     power_table,
     verdicts,
 )
-from analysis.statistics.caveats import NOT_TESTED, SHOWN, WITHHELD, Caveats
-from analysis.statistics.claims import Values, all_equivalent, claim_tests, with_people
-from analysis.statistics.equivalence import (
+from tactileq.analysis.statistics.caveats import NOT_TESTED, SHOWN, WITHHELD, Caveats
+from tactileq.analysis.statistics.claims import Values, all_equivalent, claim_tests, with_people
+from tactileq.analysis.statistics.equivalence import (
     AVERAGE_FELT,
     DIFFERENT,
     EQUAL_ON_AVERAGE,
@@ -30,8 +30,8 @@ from analysis.statistics.equivalence import (
     FELT,
     INCONCLUSIVE,
 )
-from analysis.statistics.participants.verdict import PeopleFound, PeopleSummary
-from benches.validation.procedures import equivalence_power
+from tactileq.analysis.statistics.participants.verdict import PeopleFound, PeopleSummary
+from tactileq.benches.validation.procedures import equivalence_power
 
 CLAIM = Claim(
     name="same",

@@ -13,12 +13,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.answers.responses import PlannedTask, Responses
-from analysis.chapters.reliability.section import careless_signs
-from analysis.page import saving
-from analysis.report.report import write_report
-from analysis.textures.results import TextureResult
-from modeling import InputError, RecordingSet, Threshold, simplify
+from tactileq.analysis.answers.responses import PlannedTask, Responses
+from tactileq.analysis.chapters.reliability.section import careless_signs
+from tactileq.analysis.page import saving
+from tactileq.analysis.report.report import write_report
+from tactileq.analysis.textures.results import TextureResult
+from tactileq.modeling import InputError, RecordingSet, Threshold, simplify
 from tests.refusals import refused
 
 # One report is drawn whole, for all tests that only read it (`folder`); the others are about words.
@@ -290,7 +290,7 @@ def test_nothing_of_an_unfinished_task_compares_models(tmp_path, ratings, choice
 @pytest.fixture
 def drawn(undrawn: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures as they are."""
-    monkeypatch.setattr("analysis.report.report.png_of", saving.png_of)
+    monkeypatch.setattr("tactileq.analysis.report.report.png_of", saving.png_of)
 
 
 @pytest.mark.usefixtures("drawn")
@@ -492,7 +492,7 @@ def test_a_texture_without_layers_is_reported(tmp_path, results):
 @pytest.mark.usefixtures("drawn")
 def test_a_second_report_takes_the_place_of_the_first(tmp_path, ratings, choices, monkeypatch):
     """In small pictures, which differ as soon as large ones do."""
-    monkeypatch.setattr("analysis.report.report.PICTURE_DPI", 30)
+    monkeypatch.setattr("tactileq.analysis.report.report.PICTURE_DPI", 30)
     answers = responses_of(of_six(ratings), of_six(choices), simulated=True)
     first = write_report(tmp_path / "report.html", responses=answers, seed=1).read_bytes()
     second = write_report(tmp_path / "report.html", responses=answers, seed=1).read_bytes()

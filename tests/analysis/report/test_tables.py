@@ -12,57 +12,57 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import analysis.page.page
-from analysis.answers.hand import HAND_TABLE_COLUMNS
-from analysis.answers.responses import Responses
-from analysis.chapters.chapter import Stream
-from analysis.chapters.choices import section as choices_chapter
-from analysis.chapters.claims import section as claims
-from analysis.chapters.claims.people import PRIORS_COLUMNS
-from analysis.chapters.confusions import section as confusions
-from analysis.chapters.confusions.buttons import BUTTON_COLUMNS
-from analysis.chapters.confusions.section import (
+import tactileq.analysis.page.page
+from tactileq.analysis.answers.hand import HAND_TABLE_COLUMNS
+from tactileq.analysis.answers.responses import Responses
+from tactileq.analysis.chapters.chapter import Stream
+from tactileq.analysis.chapters.choices import section as choices_chapter
+from tactileq.analysis.chapters.claims import section as claims
+from tactileq.analysis.chapters.claims.people import PRIORS_COLUMNS
+from tactileq.analysis.chapters.confusions import section as confusions
+from tactileq.analysis.chapters.confusions.buttons import BUTTON_COLUMNS
+from tactileq.analysis.chapters.confusions.section import (
     BIAS_COLUMNS,
     CHANGE_COLUMNS,
     CHOICE_FIT_COLUMNS,
     INFORMATION_COLUMNS,
     SIMILARITY_COLUMNS,
 )
-from analysis.chapters.hand.statistics import HAND_TEST_COLUMNS
-from analysis.chapters.models.section import model_section
-from analysis.chapters.oddity.section import ODDITY_COLUMNS, oddity_section
-from analysis.chapters.paper.findings import FINDING_COLUMNS, of_answers
-from analysis.chapters.paper.section import paper_section
-from analysis.chapters.parameters.section import parameter_section
-from analysis.chapters.planted.section import planted_section
-from analysis.chapters.ratings import section as ratings_chapter
-from analysis.chapters.reliability.section import CARELESS_COLUMNS, reliability_section
-from analysis.chapters.reliability.statistics import AGREEMENT_COLUMNS, RATER_COLUMNS
-from analysis.chapters.single_answers.section import (
+from tactileq.analysis.chapters.hand.statistics import HAND_TEST_COLUMNS
+from tactileq.analysis.chapters.models.section import model_section
+from tactileq.analysis.chapters.oddity.section import ODDITY_COLUMNS, oddity_section
+from tactileq.analysis.chapters.paper.findings import FINDING_COLUMNS, of_answers
+from tactileq.analysis.chapters.paper.section import paper_section
+from tactileq.analysis.chapters.parameters.section import parameter_section
+from tactileq.analysis.chapters.planted.section import planted_section
+from tactileq.analysis.chapters.ratings import section as ratings_chapter
+from tactileq.analysis.chapters.reliability.section import CARELESS_COLUMNS, reliability_section
+from tactileq.analysis.chapters.reliability.statistics import AGREEMENT_COLUMNS, RATER_COLUMNS
+from tactileq.analysis.chapters.single_answers.section import (
     CLAIM_GEE_COLUMNS,
     CLAIM_MIXED_COLUMNS,
     mixed_section,
 )
-from analysis.chapters.speed.comparison import RIGHT_WRONG_COLUMNS, TIME_RATIO_COLUMNS
-from analysis.chapters.speed.comparison import SPEED_COMPARISON_COLUMNS as SPEED_COLUMNS
-from analysis.chapters.speed.scores import CONDITIONAL_COLUMNS, SCORE_COLUMNS, TEXTURE_TIME_COLUMNS
-from analysis.chapters.speed.section import speed_accuracy_section
-from analysis.columns import TEXTURE
-from analysis.labels import ALL_TEXTURES
-from analysis.page.page import Fold, Item, Table, table_html
-from analysis.page.provenance import PROVENANCE_COLUMNS
-from analysis.page.sections import Section
-from analysis.statistics.claims import CLAIM_COLUMNS, VERDICT_COLUMNS
-from analysis.statistics.confusion import CONFUSION_COLUMNS
-from analysis.statistics.described_verdicts import PLANTED_COLUMNS, SETUP_COLUMNS
-from analysis.statistics.participants.verdict import PEOPLE_COLUMNS
-from analysis.statistics.rates import CORRECT_RATE_COLUMNS
-from analysis.statistics.verdicts import ClaimFound
-from analysis.textures.between import LEFT_OUT_COLUMNS, PLANTED_BETWEEN_COLUMNS
-from analysis.textures.compared import comparisons
-from analysis.textures.likeness import GFC_COLUMNS
-from analysis.textures.recovery import PLANTED_LAYER_COLUMNS, PLANTED_TRUTH_COLUMNS
-from analysis.textures.regressions import (
+from tactileq.analysis.chapters.speed.comparison import RIGHT_WRONG_COLUMNS, TIME_RATIO_COLUMNS
+from tactileq.analysis.chapters.speed.comparison import SPEED_COMPARISON_COLUMNS as SPEED_COLUMNS
+from tactileq.analysis.chapters.speed.scores import CONDITIONAL_COLUMNS, SCORE_COLUMNS, TEXTURE_TIME_COLUMNS
+from tactileq.analysis.chapters.speed.section import speed_accuracy_section
+from tactileq.analysis.columns import TEXTURE
+from tactileq.analysis.labels import ALL_TEXTURES
+from tactileq.analysis.page.page import Fold, Item, Table, table_html
+from tactileq.analysis.page.provenance import PROVENANCE_COLUMNS
+from tactileq.analysis.page.sections import Section
+from tactileq.analysis.statistics.claims import CLAIM_COLUMNS, VERDICT_COLUMNS
+from tactileq.analysis.statistics.confusion import CONFUSION_COLUMNS
+from tactileq.analysis.statistics.described_verdicts import PLANTED_COLUMNS, SETUP_COLUMNS
+from tactileq.analysis.statistics.participants.verdict import PEOPLE_COLUMNS
+from tactileq.analysis.statistics.rates import CORRECT_RATE_COLUMNS
+from tactileq.analysis.statistics.verdicts import ClaimFound
+from tactileq.analysis.textures.between import LEFT_OUT_COLUMNS, PLANTED_BETWEEN_COLUMNS
+from tactileq.analysis.textures.compared import comparisons
+from tactileq.analysis.textures.likeness import GFC_COLUMNS
+from tactileq.analysis.textures.recovery import PLANTED_LAYER_COLUMNS, PLANTED_TRUTH_COLUMNS
+from tactileq.analysis.textures.regressions import (
     CENTROID_AMPLITUDE_COLUMNS,
     CENTROID_COLUMNS,
     COEFFICIENT_COLUMNS,
@@ -71,32 +71,32 @@ from analysis.textures.regressions import (
     SUPPORT_COLUMNS,
     driving_table,
 )
-from analysis.textures.results import LAYER_VERDICT_COLUMNS, MODEL_FIT_COLUMNS
-from benches.atlas import hands
-from benches.atlas.edges import examine
-from benches.atlas.section import stability_section
-from benches.atlas.tables import EDGE_COLUMNS, MARGIN_COLUMNS
-from benches.chart.chart import chart_of
-from benches.chart.judging import judge
-from benches.chart.page import chart_section
-from benches.chart.summary import METHOD_COLUMNS, RIVAL_COMPARISON_COLUMNS
-from benches.chart.surfaces import Simulated, simulated_sources
-from benches.scenes.examples import SCENE_COMPARISON_COLUMNS, CompiledExample, Surface
-from benches.scenes.section import (
+from tactileq.analysis.textures.results import LAYER_VERDICT_COLUMNS, MODEL_FIT_COLUMNS
+from tactileq.benches.atlas import hands
+from tactileq.benches.atlas.edges import examine
+from tactileq.benches.atlas.section import stability_section
+from tactileq.benches.atlas.tables import EDGE_COLUMNS, MARGIN_COLUMNS
+from tactileq.benches.chart.chart import chart_of
+from tactileq.benches.chart.judging import judge
+from tactileq.benches.chart.page import chart_section
+from tactileq.benches.chart.summary import METHOD_COLUMNS, RIVAL_COMPARISON_COLUMNS
+from tactileq.benches.chart.surfaces import Simulated, simulated_sources
+from tactileq.benches.scenes.examples import SCENE_COMPARISON_COLUMNS, CompiledExample, Surface
+from tactileq.benches.scenes.section import (
     SCENE_STEP_COLUMNS,
     SCENE_TEXTURE_COLUMNS,
     scene_section,
 )
-from modeling import Scene, compile_scene, fit_ar
-from modeling.files.columns import Column, Columns, chosen, names, without
-from modeling.scenes.hands import HandRange
-from modeling.scenes.strokes import windows_kept
-from stimuli.planted.textures import PlantedSurface, planted_texture, record_texture
+from tactileq.modeling import Scene, compile_scene, fit_ar
+from tactileq.modeling.files.columns import Column, Columns, chosen, names, without
+from tactileq.modeling.scenes.hands import HandRange
+from tactileq.modeling.scenes.strokes import windows_kept
+from tactileq.stimuli.planted.textures import PlantedSurface, planted_texture, record_texture
 from tests.analysis.conftest import answered_of, by_model, people_summary
 
 pytestmark = pytest.mark.usefixtures("few_draws")
 
-PAGE = Path(analysis.page.page.__file__)
+PAGE = Path(tactileq.analysis.page.page.__file__)
 DECLARED = {
     "paper": FINDING_COLUMNS,
     "claims": VERDICT_COLUMNS,
@@ -339,5 +339,5 @@ def test_the_page_names_no_column() -> None:
 def test_the_page_knows_of_analysis_only_what_a_column_is() -> None:
     tree = ast.parse(PAGE.read_text(encoding="utf-8"))
     modules = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
-    assert "modeling.files.columns" in modules
+    assert "tactileq.modeling.files.columns" in modules
     assert not {name for name in modules if name and name.startswith("analysis")}

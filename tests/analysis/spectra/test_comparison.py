@@ -9,26 +9,26 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from analysis.spectra.comparison import compare_condition, compare_spectra, spectrum_panels
-from analysis.spectra.figures.layers_over_grid import (
+from tactileq.analysis.spectra.comparison import compare_condition, compare_spectra, spectrum_panels
+from tactileq.analysis.spectra.figures.layers_over_grid import (
     QUANTITIES,
     figure_layers_over_grid,
     plot_layers_over_grid,
 )
-from analysis.spectra.figures.spectra import (
+from tactileq.analysis.spectra.figures.spectra import (
     figure_spectra,
     figure_spectra_and_threshold,
     plot_model_spectrum,
 )
-from analysis.spectra.layers_over_grid import layers_over_grid
-from analysis.textures.results import TextureResult
-from modeling import CRITERIA, InputError, RecordingSet, TextureModel, Threshold, simplify
-from modeling.estimation.estimators import find_layers
-from modeling.fitting.conditions import recording_spectra
-from modeling.perception.amplitudes import layer_amplitudes_g
-from modeling.perception.signs_of_rest import with_signs_chosen_again
-from modeling.recordings.spectrum import high_pass_response, mean_spectrum, smooth
-from stimuli.planted.textures import record_texture
+from tactileq.analysis.spectra.layers_over_grid import layers_over_grid
+from tactileq.analysis.textures.results import TextureResult
+from tactileq.modeling import CRITERIA, InputError, RecordingSet, TextureModel, Threshold, simplify
+from tactileq.modeling.estimation.estimators import find_layers
+from tactileq.modeling.fitting.conditions import recording_spectra
+from tactileq.modeling.perception.amplitudes import layer_amplitudes_g
+from tactileq.modeling.perception.signs_of_rest import with_signs_chosen_again
+from tactileq.modeling.recordings.spectrum import high_pass_response, mean_spectrum, smooth
+from tactileq.stimuli.planted.textures import record_texture
 from tests.refusals import refused
 
 pytestmark = pytest.mark.filterwarnings("error")

@@ -9,13 +9,13 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from analysis.spectra.contact_sheet import LINE_HZ, ContactSheet, contact_sheet
-from analysis.spectra.figures.stimuli import figure_contact_sheet, plot_stimuli
-from modeling import TextureModel
-from stimuli.planted.textures import planted_texture
-from stimuli.planted.vibrators import planted_vibrator
-from stimuli.sets.recipe import ModelEntry, Recipe, SetLevel, TrajectoryEntry
-from stimuli.sets.writing import write_set
+from tactileq.analysis.spectra.contact_sheet import LINE_HZ, ContactSheet, contact_sheet
+from tactileq.analysis.spectra.figures.stimuli import figure_contact_sheet, plot_stimuli
+from tactileq.modeling import TextureModel
+from tactileq.stimuli.planted.textures import planted_texture
+from tactileq.stimuli.planted.vibrators import planted_vibrator
+from tactileq.stimuli.sets.recipe import ModelEntry, Recipe, SetLevel, TrajectoryEntry
+from tactileq.stimuli.sets.writing import write_set
 
 GRID = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
 TEXTURES = ("PVC", "canvas")

@@ -9,10 +9,10 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from analysis.spectra.figures.vibrator import figure_vibrator, plot_coherence, plot_compensation
-from analysis.spectra.vibrator import CompensatedVibrator, compensated
-from modeling import Vibrator, compensation_for
-from stimuli.planted.vibrators import SimulatedVibrator
+from tactileq.analysis.spectra.figures.vibrator import figure_vibrator, plot_coherence, plot_compensation
+from tactileq.analysis.spectra.vibrator import CompensatedVibrator, compensated
+from tactileq.modeling import Vibrator, compensation_for
+from tactileq.stimuli.planted.vibrators import SimulatedVibrator
 
 pytestmark = pytest.mark.filterwarnings("error")
 CURVE_HZ = np.geomspace(10.0, 2440.0, 600)

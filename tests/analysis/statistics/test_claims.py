@@ -10,9 +10,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import stats
 
-from analysis.answers.plan import Claim
-from analysis.labels import ALL_TEXTURES, IDENTICAL
-from analysis.statistics.caveats import (
+from tactileq.analysis.answers.plan import Claim
+from tactileq.analysis.labels import ALL_TEXTURES, IDENTICAL
+from tactileq.analysis.statistics.caveats import (
     BOUNDS_WITHHELD,
     INTERIM,
     NOT_TESTED,
@@ -20,7 +20,7 @@ from analysis.statistics.caveats import (
     WITHHELD,
     Caveats,
 )
-from analysis.statistics.claims import (
+from tactileq.analysis.statistics.claims import (
     CLAIM_COLUMNS,
     CONTROL,
     Values,
@@ -29,9 +29,9 @@ from analysis.statistics.claims import (
     complete_means,
     share_at_ends,
 )
-from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE, WITHIN_BOUNDS
-from analysis.statistics.paired import holm
-from modeling.files.columns import names
+from tactileq.analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE, WITHIN_BOUNDS
+from tactileq.analysis.statistics.paired import holm
+from tactileq.modeling.files.columns import names
 
 CLAIM = Claim(
     name="as strong",

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy import stats
 from statsmodels.stats.weightstats import ttost_paired
 
-from analysis.statistics.equivalence import (
+from tactileq.analysis.statistics.equivalence import (
     DIFFERENT,
     EQUIVALENT,
     INCONCLUSIVE,
@@ -20,7 +20,7 @@ from analysis.statistics.equivalence import (
     one_sided_tests,
     verdict,
 )
-from modeling import InputError
+from tactileq.modeling import InputError
 from tests.refusals import refused
 
 # Student (1908), extra hours of sleep, as R's data set `sleep`.

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.optimize import minimize
 
-from analysis.statistics.design import MODEL_EFFECT, ORDER, SESSION, complete_participants, design
-from analysis.statistics.mixed import (
+from tactileq.analysis.statistics.design import MODEL_EFFECT, ORDER, SESSION, complete_participants, design
+from tactileq.analysis.statistics.mixed import (
     MIXED_COLUMNS,
     MIXED_MODEL,
     PAIRED,
@@ -21,8 +21,8 @@ from analysis.statistics.mixed import (
     mixed_effects,
     t_of,
 )
-from analysis.statistics.paired import paired_test
-from modeling.files.columns import names
+from tactileq.analysis.statistics.paired import paired_test
+from tactileq.modeling.files.columns import names
 
 DATA = Path(__file__).parents[2] / "data" / "sleepstudy" / "reaction_ms.tsv"
 MODELS = ("full", "simplified")

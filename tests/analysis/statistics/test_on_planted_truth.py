@@ -10,12 +10,12 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.answers.plan import Claim
-from analysis.labels import ALL_TEXTURES
-from analysis.statistics.caveats import Caveats
-from analysis.statistics.claims import Values, claim_tests, complete_means
-from analysis.statistics.paired import holm, paired_test
-from analysis.statistics.rates import correct_rates
+from tactileq.analysis.answers.plan import Claim
+from tactileq.analysis.labels import ALL_TEXTURES
+from tactileq.analysis.statistics.caveats import Caveats
+from tactileq.analysis.statistics.claims import Values, claim_tests, complete_means
+from tactileq.analysis.statistics.paired import holm, paired_test
+from tactileq.analysis.statistics.rates import correct_rates
 
 pytestmark = pytest.mark.long("simulations by the hundred")
 
@@ -29,7 +29,7 @@ def binomial_limits(probability: float, repeats: int) -> tuple[float, float]:
 @pytest.fixture
 def few_flips(monkeypatch: pytest.MonkeyPatch) -> None:
     """Sign flips stand beside the t-test: none of what is judged here is theirs."""
-    monkeypatch.setattr("analysis.statistics.paired.RESAMPLES", 99)
+    monkeypatch.setattr("tactileq.analysis.statistics.paired.RESAMPLES", 99)
 
 
 @pytest.mark.usefixtures("few_flips")
@@ -62,7 +62,7 @@ def test_holm_keeps_the_family_of_seven_below_five_per_cent():
 
 def test_the_bootstrap_interval_of_a_correct_rate_covers_the_truth(monkeypatch):
     # Fewer resamples than in use: the coverage does not hang on their number.
-    monkeypatch.setattr("analysis.statistics.rates.BOOTSTRAP_RESAMPLES", 1000)
+    monkeypatch.setattr("tactileq.analysis.statistics.rates.BOOTSTRAP_RESAMPLES", 1000)
     rng = np.random.default_rng(22)
     repeats, people, trials, truth = 250, 24, 3, 0.4
     covered = 0

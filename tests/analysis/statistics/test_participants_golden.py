@@ -14,12 +14,12 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
-from analysis.statistics.participants.choices import ChoiceSampler
-from analysis.statistics.participants.ratings import RatingSampler
-from modeling.arrays import Floats
-from modeling.participants.choices import ODDITY, ChoicePriors, ChoiceStudies, forced_choice
-from modeling.participants.effects import EffectPriors
-from modeling.participants.ratings import RatingPriors, RatingStudies
+from tactileq.analysis.statistics.participants.choices import ChoiceSampler
+from tactileq.analysis.statistics.participants.ratings import RatingSampler
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.participants.choices import ODDITY, ChoicePriors, ChoiceStudies, forced_choice
+from tactileq.modeling.participants.effects import EffectPriors
+from tactileq.modeling.participants.ratings import RatingPriors, RatingStudies
 
 DATA = Path(__file__).parents[2] / "data" / "participants_posterior"
 Sampler = RatingSampler | ChoiceSampler

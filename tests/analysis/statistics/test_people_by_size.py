@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from analysis.statistics.participants.design import PeopleData, first_people, side_by_side
-from analysis.statistics.participants.posterior import Effort
-from analysis.statistics.participants.verdict import PeopleJudged, judged_by_size
-from modeling.participants.choices import ChoiceStudies, DecisionModel, forced_choice
-from modeling.participants.ratings import RatingStudies
+from tactileq.analysis.statistics.participants.design import PeopleData, first_people, side_by_side
+from tactileq.analysis.statistics.participants.posterior import Effort
+from tactileq.analysis.statistics.participants.verdict import PeopleJudged, judged_by_size
+from tactileq.modeling.participants.choices import ChoiceStudies, DecisionModel, forced_choice
+from tactileq.modeling.participants.ratings import RatingStudies
 
 N, TEXTURES, SMALL = 14, 3, 9
 NAMES = [f"t{number}" for number in range(TEXTURES)]

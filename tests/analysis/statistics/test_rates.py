@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from analysis.statistics.rates import clopper_pearson
+from tactileq.analysis.statistics.rates import clopper_pearson
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy import stats
 
-from analysis.labels import ALL_TEXTURES
-from analysis.statistics.confusion import confusion_matrices
-from analysis.statistics.paired import (
+from tactileq.analysis.labels import ALL_TEXTURES
+from tactileq.analysis.statistics.confusion import confusion_matrices
+from tactileq.analysis.statistics.paired import (
     d_z_interval,
     holm,
     paired_test,
@@ -21,8 +21,8 @@ from analysis.statistics.paired import (
     standard_error,
     wilcoxon,
 )
-from analysis.statistics.rates import correct_rates
-from modeling import InputError
+from tactileq.analysis.statistics.rates import correct_rates
+from tactileq.modeling import InputError
 from tests.refusals import refused
 
 # Student (1908): extra hours of sleep with two drugs, ten patients. The expected values are those

@@ -10,14 +10,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.answers.plan import AnalysisPlan
-from analysis.answers.responses import PlannedTask, Responses, leave_out
-from analysis.chapters.claims.answer import answer
-from analysis.chapters.claims.plan_sentences import methods_paragraph
-from analysis.chapters.claims.sentences import claim_outcomes
-from analysis.labels import ALL_TEXTURES
-from analysis.power.power import verdicts
-from analysis.statistics.caveats import (
+from tactileq.analysis.answers.plan import AnalysisPlan
+from tactileq.analysis.answers.responses import PlannedTask, Responses, leave_out
+from tactileq.analysis.chapters.claims.answer import answer
+from tactileq.analysis.chapters.claims.plan_sentences import methods_paragraph
+from tactileq.analysis.chapters.claims.sentences import claim_outcomes
+from tactileq.analysis.labels import ALL_TEXTURES
+from tactileq.analysis.power.power import verdicts
+from tactileq.analysis.statistics.caveats import (
     BOUNDS_WITHHELD,
     EQUALITY,
     INTERIM,
@@ -25,11 +25,11 @@ from analysis.statistics.caveats import (
     SHOWN,
     WITHHELD,
 )
-from analysis.statistics.compared_answers import all_claims, chance_of, claim_values, pairs_of
-from analysis.statistics.described_verdicts import check_complete, incomplete, planted_verdicts
-from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, WITHIN_BOUNDS
-from analysis.statistics.verdicts import ClaimFound, claim_caveats, claims_found
-from modeling import InputError
+from tactileq.analysis.statistics.compared_answers import all_claims, chance_of, claim_values, pairs_of
+from tactileq.analysis.statistics.described_verdicts import check_complete, incomplete, planted_verdicts
+from tactileq.analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, WITHIN_BOUNDS
+from tactileq.analysis.statistics.verdicts import ClaimFound, claim_caveats, claims_found
+from tactileq.modeling import InputError
 from tests.analysis.conftest import words_of
 from tests.refusals import refused
 

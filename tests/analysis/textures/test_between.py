@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.textures.between import (
+from tactileq.analysis.textures.between import (
     DISTANCE,
     LEVEL,
     FilterAt,
@@ -26,13 +26,13 @@ from analysis.textures.between import (
     truth_summary,
     worth_recording,
 )
-from analysis.textures.results import TextureResult
-from modeling import RecordingSet, Threshold, fit_texture, simplify
-from modeling.arrays import Floats
-from modeling.fitting.conditions import recording_spectra
-from modeling.fitting.texture import fit_spectra
-from stimuli.planted.drawn import draw_surface
-from stimuli.planted.textures import PlantedSurface, planted_texture, record_texture
+from tactileq.analysis.textures.results import TextureResult
+from tactileq.modeling import RecordingSet, Threshold, fit_texture, simplify
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.fitting.conditions import recording_spectra
+from tactileq.modeling.fitting.texture import fit_spectra
+from tactileq.stimuli.planted.drawn import draw_surface
+from tactileq.stimuli.planted.textures import PlantedSurface, planted_texture, record_texture
 
 FREQUENCY_HZ = np.arange(15.0, 481.0)
 FIVE_SPEEDS = np.array([60.0, 100.0, 160.0, 230.0, 300.0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from analysis.textures.compared import comparisons
+from tactileq.analysis.textures.compared import comparisons
 
 
 def backwards(work, items):

@@ -11,16 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from analysis.labels import ALL_LAYERS
-from analysis.textures.recovery import (
+from tactileq.analysis.labels import ALL_LAYERS
+from tactileq.analysis.textures.recovery import (
     NO_PARTNER,
     match_layers,
     planted_layers_table,
     planted_truth_table,
     truth_at_rate,
 )
-from modeling import InputError, TextureModel, fit_texture
-from stimuli.planted.textures import RECORDER_RATE_HZ, planted_texture, record_texture
+from tactileq.modeling import InputError, TextureModel, fit_texture
+from tactileq.stimuli.planted.textures import RECORDER_RATE_HZ, planted_texture, record_texture
 from tests.refusals import refused
 
 

@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from analysis.chapters.parameters.figure import figure_centroid, plot_centroid
-from analysis.chapters.parameters.section import parameter_section
-from analysis.textures.compared import comparisons
-from analysis.textures.regressions import (
+from tactileq.analysis.chapters.parameters.figure import figure_centroid, plot_centroid
+from tactileq.analysis.chapters.parameters.section import parameter_section
+from tactileq.analysis.textures.compared import comparisons
+from tactileq.analysis.textures.regressions import (
     NAMES,
     centroid_amplitude_table,
     centroid_table,
@@ -22,9 +22,9 @@ from analysis.textures.regressions import (
     regression_table,
     support_table,
 )
-from analysis.textures.results import TextureResult
-from modeling import TextureModel, Threshold, regressed, similarity, simplify
-from modeling.fitting.conditions import recording_spectra
+from tactileq.analysis.textures.results import TextureResult
+from tactileq.modeling import TextureModel, Threshold, regressed, similarity, simplify
+from tactileq.modeling.fitting.conditions import recording_spectra
 
 pytestmark = pytest.mark.filterwarnings("error")
 SPEEDS, FORCES = np.linspace(50, 350, 4), np.linspace(0.5, 3.5, 4)

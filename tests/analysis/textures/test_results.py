@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from analysis.spectra.comparison import compare_spectra
-from analysis.textures.likeness import condition_targets, gfc_table
-from analysis.textures.recordings import layers_of_recordings, layers_table, spectra_table
-from analysis.textures.results import TextureResult, simplification_table
-from modeling import (
+from tactileq.analysis.spectra.comparison import compare_spectra
+from tactileq.analysis.textures.likeness import condition_targets, gfc_table
+from tactileq.analysis.textures.recordings import layers_of_recordings, layers_table, spectra_table
+from tactileq.analysis.textures.results import TextureResult, simplification_table
+from tactileq.modeling import (
     InputError,
     Recording,
     RecordingSet,
@@ -22,8 +22,8 @@ from modeling import (
     simplify,
     spectrum,
 )
-from modeling.fitting.conditions import recording_spectra
-from stimuli.planted.textures import planted_texture, record_texture
+from tactileq.modeling.fitting.conditions import recording_spectra
+from tactileq.stimuli.planted.textures import planted_texture, record_texture
 from tests.refusals import refused
 
 

@@ -7,19 +7,19 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from analysis.labels import ALL_TEXTURES
-from analysis.spectra.figures.scenes import figure_tradeoff
-from analysis.textures.scenes import (
+from tactileq.analysis.labels import ALL_TEXTURES
+from tactileq.analysis.spectra.figures.scenes import figure_tradeoff
+from tactileq.analysis.textures.scenes import (
     BEFORE_AFTER_COLUMNS,
     SHARED,
     STEP_COLUMNS,
     before_after_table,
     steps_table,
 )
-from modeling import CompiledScene, Scene, compile_scene
-from modeling.files.columns import names
-from modeling.scenes.hands import HandRange
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import CompiledScene, Scene, compile_scene
+from tactileq.modeling.files.columns import names
+from tactileq.modeling.scenes.hands import HandRange
+from tactileq.stimuli.planted.textures import planted_texture
 
 
 @pytest.fixture(scope="module")

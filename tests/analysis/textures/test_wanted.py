@@ -7,8 +7,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from analysis.textures.between import chessboard, halfway
-from analysis.textures.wanted import half_way_to_neighbours
+from tactileq.analysis.textures.between import chessboard, halfway
+from tactileq.analysis.textures.wanted import half_way_to_neighbours
 
 SPEEDS, FORCES = (50.0, 150.0, 250.0, 350.0), (0.5, 1.5, 2.5, 3.5)
 LATTICE = [(speed, force) for speed in SPEEDS for force in FORCES]

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.statistics.paired import (
+from tactileq.analysis.statistics.paired import (
     t_test,
     t_tests,
 )
-from analysis.statistics.rates import bootstrap_intervals
-from benches.atlas import answers
-from benches.atlas.answers import BOOTSTRAP, CASES, D_Z, RANKS, RATERS, T
-from benches.atlas.case import FAILS, HOLDS, Case
-from benches.atlas.edges import examine
-from benches.raters import paired_power
+from tactileq.analysis.statistics.rates import bootstrap_intervals
+from tactileq.benches.atlas import answers
+from tactileq.benches.atlas.answers import BOOTSTRAP, CASES, D_Z, RANKS, RATERS, T
+from tactileq.benches.atlas.case import FAILS, HOLDS, Case
+from tactileq.benches.atlas.edges import examine
+from tactileq.benches.raters import paired_power
 
 NEVER = [case for case in CASES if case.theory is answers.never]
 

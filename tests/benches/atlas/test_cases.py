@@ -8,13 +8,13 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from benches.atlas import blending, filters, hands, vibrators
-from benches.atlas.case import HOLDS, Case
-from benches.atlas.cases import CASES, TO_COME
-from benches.atlas.tables import LEAST_MARGIN
-from benches.rendering.clicks import hum, this_renderer
-from benches.rendering.stability import DIRECT, FORMS, OURS, PLAIN
-from modeling import compensation_for, flat_band
+from tactileq.benches.atlas import blending, filters, hands, vibrators
+from tactileq.benches.atlas.case import HOLDS, Case
+from tactileq.benches.atlas.cases import CASES, TO_COME
+from tactileq.benches.atlas.tables import LEAST_MARGIN
+from tactileq.benches.rendering.clicks import hum, this_renderer
+from tactileq.benches.rendering.stability import DIRECT, FORMS, OURS, PLAIN
+from tactileq.modeling import compensation_for, flat_band
 
 WIDTH = "width, ±1 octave"
 KNOWN = ("filters", "blending", "hands", "vibrators")
@@ -112,8 +112,8 @@ def test_a_direct_form_in_single_precision_errs_as_its_poles_are_rounded(rate_hz
 @pytest.mark.parametrize("form", [DIRECT, PLAIN])
 def test_recursions_in_double_precision_are_the_same_filter(form: str) -> None:
     """Against the state equations of `stability.FORMS`."""
-    from benches.rendering.stability import simulate
-    from modeling.models.parameter_table import Parameters
+    from tactileq.benches.rendering.stability import simulate
+    from tactileq.modeling.models.parameter_table import Parameters
 
     noise, ones = np.random.default_rng(0).standard_normal(400), np.ones((400, 1))
     at = Parameters(0 * ones[:, 0], 300 * ones, 40 * ones, ones)

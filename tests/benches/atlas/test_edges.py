@@ -8,8 +8,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from benches.atlas.case import DEGRADES, FAILS, HOLDS, Axis, Case, Measure
-from benches.atlas.edges import BISECTIONS, CELLS, SEARCHED, Examined, examine
+from tactileq.benches.atlas.case import DEGRADES, FAILS, HOLDS, Axis, Case, Measure
+from tactileq.benches.atlas.edges import BISECTIONS, CELLS, SEARCHED, Examined, examine
 
 LOGARITHMIC = Axis(name="speed", unit="Hz", mild=1.0, severe=1000.0, default=2.0)
 BACKWARDS = Axis(name="width", unit="Hz", mild=1000.0, severe=1.0, default=500.0)

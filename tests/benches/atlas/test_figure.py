@@ -7,11 +7,11 @@ import math
 import pytest
 from matplotlib.axes import Axes
 
-from analysis.page.drawing import BLACK
-from benches.atlas.case import Axis, Case
-from benches.atlas.edges import Examined, examine
-from benches.atlas.figure import COLOURS, MARKERS, figure_atlas, panels_of, plot_panel
-from benches.atlas.section import atlas_files, stability_section
+from tactileq.analysis.page.drawing import BLACK
+from tactileq.benches.atlas.case import Axis, Case
+from tactileq.benches.atlas.edges import Examined, examine
+from tactileq.benches.atlas.figure import COLOURS, MARKERS, figure_atlas, panels_of, plot_panel
+from tactileq.benches.atlas.section import atlas_files, stability_section
 
 SPEED = Axis(name="speed", unit="Hz", mild=1.0, severe=1000.0, default=2.0)
 

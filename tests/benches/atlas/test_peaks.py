@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benches.atlas import peaks
-from benches.atlas.case import FAILS, HOLDS, Case
-from benches.atlas.edges import examine
-from benches.atlas.peaks import CASES, JOINT, generator, planted
-from modeling.estimation.layers import Layers, no_layers
-from stimuli.planted.spectra import RATE_HZ, RandomTruth
+from tactileq.benches.atlas import peaks
+from tactileq.benches.atlas.case import FAILS, HOLDS, Case
+from tactileq.benches.atlas.edges import examine
+from tactileq.benches.atlas.peaks import CASES, JOINT, generator, planted
+from tactileq.modeling.estimation.layers import Layers, no_layers
+from tactileq.stimuli.planted.spectra import RATE_HZ, RandomTruth
 
 OURS = [case for case in CASES if case.ours]
 

@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from benches.atlas.case import FAILS, HOLDS, Axis, Case
-from benches.atlas.edges import examine
-from benches.atlas.tables import (
+from tactileq.benches.atlas.case import FAILS, HOLDS, Axis, Case
+from tactileq.benches.atlas.edges import examine
+from tactileq.benches.atlas.tables import (
     CELL_COLUMNS,
     EDGE_COLUMNS,
     MARGIN_COLUMNS,
@@ -19,7 +19,7 @@ from benches.atlas.tables import (
     edge_table,
     margin_table,
 )
-from modeling.files.columns import names
+from tactileq.modeling.files.columns import names
 
 SPEED = Axis(name="speed", unit="Hz", mild=1.0, severe=10_000.0, default=3.0)
 LEVEL = Axis(name="level", unit="dB", mild=-20.0, severe=20.0, logarithmic=False)

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benches.atlas import tracking
-from benches.atlas.case import FAILS, HOLDS, Case
-from benches.atlas.tracking import CASES, EITHER, JOINT, WIDTH_HZ, planted
-from modeling import TextureModel
+from tactileq.benches.atlas import tracking
+from tactileq.benches.atlas.case import FAILS, HOLDS, Case
+from tactileq.benches.atlas.tracking import CASES, EITHER, JOINT, WIDTH_HZ, planted
+from tactileq.modeling import TextureModel
 
 
 def case_of(axis: str, method: str) -> Case:

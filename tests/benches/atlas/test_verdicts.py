@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benches.atlas import verdicts
-from benches.atlas.case import Case
-from benches.atlas.verdicts import ALL_RULES, BY_LEVEL, CASES, RULES, planted
-from modeling import TextureModel
-from modeling.perception.amplitudes import layer_amplitudes_g
-from modeling.perception.signs_of_rest import with_signs_chosen_again
-from modeling.seeds import generator
+from tactileq.benches.atlas import verdicts
+from tactileq.benches.atlas.case import Case
+from tactileq.benches.atlas.verdicts import ALL_RULES, BY_LEVEL, CASES, RULES, planted
+from tactileq.modeling import TextureModel
+from tactileq.modeling.perception.amplitudes import layer_amplitudes_g
+from tactileq.modeling.perception.signs_of_rest import with_signs_chosen_again
+from tactileq.modeling.seeds import generator
 
 LAYERS = len(verdicts.PLACES_HZ)
 

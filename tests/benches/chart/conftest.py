@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from benches.chart.chart import Chart, chart_of
-from benches.chart.judging import Judged, judge
-from benches.chart.surfaces import Simulated, simulated_sources
+from tactileq.benches.chart.chart import Chart, chart_of
+from tactileq.benches.chart.judging import Judged, judge
+from tactileq.benches.chart.surfaces import Simulated, simulated_sources
 
 FEW_METHODS = (
     "joint, 1 layer",

@@ -9,13 +9,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benches.chart.chart import Chart
-from benches.chart.figure import PANELS, figure_chart
-from benches.chart.judging import Judged
-from benches.chart.page import COSTS, MEASURES, chart_files, chart_section, chart_tables
-from benches.chart.surfaces import counted_kind
-from benches.chart.timing import stream_of, time_table
-from benches.rendering.timer import Turn
+from tactileq.benches.chart.chart import Chart
+from tactileq.benches.chart.figure import PANELS, figure_chart
+from tactileq.benches.chart.judging import Judged
+from tactileq.benches.chart.page import COSTS, MEASURES, chart_files, chart_section, chart_tables
+from tactileq.benches.chart.surfaces import counted_kind
+from tactileq.benches.chart.timing import stream_of, time_table
+from tactileq.benches.rendering.timer import Turn
 
 
 @pytest.mark.long("the times of this machine")

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import benches.rendering
-import modeling.rendering
-from benches.chart.fitted import Layered, extrapolated_to_ends
-from benches.chart.rival_costs import (
+import tactileq.benches.rendering
+import tactileq.modeling.rendering
+from tactileq.benches.chart.fitted import Layered, extrapolated_to_ends
+from tactileq.benches.chart.rival_costs import (
     COST_RATE_HZ,
     bands_cost,
     block_samples,
@@ -22,22 +22,22 @@ from benches.chart.rival_costs import (
     loops_cost,
     shaped_noise_cost,
 )
-from benches.chart.rival_fits import Filtered, Grained, Looped, Shaped
-from benches.chart.shaped_noise import ShapedNoise
-from benches.rendering.accuracy import stroke
-from benches.rendering.coefficients import BandTable, tabled_bands
-from benches.rendering.rivals import BANDS, COEFFICIENTS, CompiledStream, SoundStream, predictor_of
-from benches.rendering.stored_sounds import Grains, Loops
-from modeling import regressed, render_many
-from modeling.hand import Hand
-from modeling.rendering.cost import Cost
-from modeling.rendering.plan import RenderPlan
-from stimuli.planted.textures import planted_texture
+from tactileq.benches.chart.rival_fits import Filtered, Grained, Looped, Shaped
+from tactileq.benches.chart.shaped_noise import ShapedNoise
+from tactileq.benches.rendering.accuracy import stroke
+from tactileq.benches.rendering.coefficients import BandTable, tabled_bands
+from tactileq.benches.rendering.rivals import BANDS, COEFFICIENTS, CompiledStream, SoundStream, predictor_of
+from tactileq.benches.rendering.stored_sounds import Grains, Loops
+from tactileq.modeling import regressed, render_many
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.rendering.cost import Cost
+from tactileq.modeling.rendering.plan import RenderPlan
+from tactileq.stimuli.planted.textures import planted_texture
 
 HERE = Path(__file__).parent
 FOLDERS = (
-    Path(modeling.rendering.__file__).parent,
-    Path(benches.rendering.__file__).parent,
+    Path(tactileq.modeling.rendering.__file__).parent,
+    Path(tactileq.benches.rendering.__file__).parent,
     HERE.parents[1] / "modeling" / "rendering",
 )
 WHAT = ("additions", "multiplications", "divisions", "square_roots")

@@ -9,15 +9,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benches.chart.judging import PRECISIONS, UPDATES_MS, Judged, judge
-from benches.chart.methods import (
+from tactileq.benches.chart.judging import PRECISIONS, UPDATES_MS, Judged, judge
+from tactileq.benches.chart.methods import (
     LEFT_TO_FULL,
     METHODS,
     Subject,
     chosen_methods,
     fit_method,
 )
-from benches.chart.surfaces import (
+from tactileq.benches.chart.surfaces import (
     Origin,
     Simulated,
     judged_stroke,
@@ -26,8 +26,8 @@ from benches.chart.surfaces import (
     simulated_sources,
     toolkit_sources,
 )
-from modeling import InputError, RecordingSet, fit_ar
-from stimuli.planted.drawn import FORCES_N, SPEEDS_MM_S, draw_surface
+from tactileq.modeling import InputError, RecordingSet, fit_ar
+from tactileq.stimuli.planted.drawn import FORCES_N, SPEEDS_MM_S, draw_surface
 from tests.refusals import refused
 
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benches.chart.measures import Accuracy, ReferenceMagnitude, frequencies_hz, over_conditions
-from modeling import PEQ
+from tactileq.benches.chart.measures import Accuracy, ReferenceMagnitude, frequencies_hz, over_conditions
+from tactileq.modeling import PEQ
 
 TRUTH = PEQ(
     noise_gain=0.02, frequencies_hz=[80.0], bandwidths_hz=[30.0], gains=[0.4], rate_hz=1000.0

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import welch
 
-from benches.chart.shaped_noise import ShapedFilter, ShapedNoise, fit_shaped_noise
-from modeling import PEQ, Recording, spectrum
+from tactileq.benches.chart.shaped_noise import ShapedFilter, ShapedNoise, fit_shaped_noise
+from tactileq.modeling import PEQ, Recording, spectrum
 
 RATE_HZ = 1000.0
 AXES = (np.array([50.0, 100.0]), np.array([1.0, 2.0]))

@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from benches.chart.judging import PLACES
-from benches.chart.measures import SUMMARIES
-from benches.chart.methods import METHODS
-from benches.chart.summary import (
+from tactileq.benches.chart.judging import PLACES
+from tactileq.benches.chart.measures import SUMMARIES
+from tactileq.benches.chart.methods import METHODS
+from tactileq.benches.chart.summary import (
     COSTS,
     comparison_table,
     comparisons,

@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benches.recorder.figure import figure_recorder
-from benches.recorder.section import recorder_section
-from benches.recorder.tables import held_table, moved_table, near_table
-from stimuli.planted.textures import PlantedSurface, planted_texture
+from tactileq.benches.recorder.figure import figure_recorder
+from tactileq.benches.recorder.section import recorder_section
+from tactileq.benches.recorder.tables import held_table, moved_table, near_table
+from tactileq.stimuli.planted.textures import PlantedSurface, planted_texture
 
 RECORDS = pd.DataFrame(
     {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benches.rendering.accuracy import (
+from tactileq.benches.rendering.accuracy import (
     FASTEST_MM_S,
     FORCE_N,
     SpeedErrors,
@@ -15,19 +15,19 @@ from benches.rendering.accuracy import (
     stroke,
     update_error_db,
 )
-from benches.rendering.clicks import (
+from tactileq.benches.rendering.clicks import (
     hum,
     loudest_above_click_hz_db,
     switched,
     this_renderer,
     times_s,
 )
-from benches.rendering.stability import FORMS, OURS, PLAIN, STROKE_HZ, simulate
-from modeling import Recording, Renderer, TextureModel, similarity
-from modeling.hand import Hand
-from modeling.rendering.noise import stream_key, white_noise
-from modeling.rendering.plan import RELEASE_S, RenderPlan
-from stimuli.planted.textures import TEXTURES, planted_texture
+from tactileq.benches.rendering.stability import FORMS, OURS, PLAIN, STROKE_HZ, simulate
+from tactileq.modeling import Recording, Renderer, TextureModel, similarity
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.rendering.noise import stream_key, white_noise
+from tactileq.modeling.rendering.plan import RELEASE_S, RenderPlan
+from tactileq.stimuli.planted.textures import TEXTURES, planted_texture
 
 RATE_HZ = 5000.0
 

@@ -8,24 +8,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from benches.rendering.coefficients import (
+from tactileq.benches.rendering.coefficients import (
     CoefficientTable,
     fit_sections,
     tabled,
     tabled_bands,
     tabled_predictor,
 )
-from benches.rendering.rivals import (
+from tactileq.benches.rendering.rivals import (
     BANDS,
     COEFFICIENTS,
     CompiledStream,
     layered_texture,
     predictor_of,
 )
-from modeling import PEQ, ARModel, InputError, Renderer, Spectrum
-from modeling.models.line_spectral import line_spectral_frequencies
-from modeling.rendering.noise import stream_key, white_noise
-from modeling.similarity import log_spectral_distance_db
+from tactileq.modeling import PEQ, ARModel, InputError, Renderer, Spectrum
+from tactileq.modeling.models.line_spectral import line_spectral_frequencies
+from tactileq.modeling.rendering.noise import stream_key, white_noise
+from tactileq.modeling.similarity import log_spectral_distance_db
 from tests.refusals import refused
 
 RATE_HZ = 5000.0

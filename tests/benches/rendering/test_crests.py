@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.special import erfinv
 
-from benches.rendering.crests import RATE_HZ, crest_db, crest_difference_db, through_band
-from modeling.equalizer.bands import band_rms
+from tactileq.benches.rendering.crests import RATE_HZ, crest_db, crest_difference_db, through_band
+from tactileq.modeling.equalizer.bands import band_rms
 
 STREAMS = 20
 WIDTHS_HZ = (10.0, 30.0, 100.0, 300.0)

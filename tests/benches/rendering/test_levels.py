@@ -7,16 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benches.rendering.coefficients import PoleZeroFilter, SecondOrderBands
-from benches.rendering.levels import (
+from tactileq.benches.rendering.coefficients import PoleZeroFilter, SecondOrderBands
+from tactileq.benches.rendering.levels import (
     System,
     level_at_rest,
     levels_in_motion,
     louder_by,
     systems_of_layers,
 )
-from modeling import PEQ
-from modeling.models.parameter_table import Parameters
+from tactileq.modeling import PEQ
+from tactileq.modeling.models.parameter_table import Parameters
 
 RATE_HZ = 5000.0
 FREQUENCY_HZ = np.linspace(0, RATE_HZ / 2, 50001)

@@ -7,10 +7,10 @@ from itertools import product
 import numpy as np
 import pytest
 
-from benches.rendering.other_rates import RateErrors, rate_errors
-from modeling import PEQ
-from modeling.rendering.interpolation import interpolation
-from stimuli.planted.textures import TEXTURES, planted_texture
+from tactileq.benches.rendering.other_rates import RateErrors, rate_errors
+from tactileq.modeling import PEQ
+from tactileq.modeling.rendering.interpolation import interpolation
+from tactileq.stimuli.planted.textures import TEXTURES, planted_texture
 
 MODEL_RATE_HZ = 5000.0
 RATES_HZ = [44_100, 48_000]

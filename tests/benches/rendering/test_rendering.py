@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benches.rendering.bench import (
+from tactileq.benches.rendering.bench import (
     BLOCKS,
     BY_BLOCK,
     FROM_PYTHON,
@@ -29,14 +29,14 @@ from benches.rendering.bench import (
     bench_rendering,
     stroke,
 )
-from benches.rendering.figure import (
+from tactileq.benches.rendering.figure import (
     BLOCK_COLOURS,
     FILTER_COLOURS,
     figure_rendering,
     plot_costs,
     plot_sweep,
 )
-from benches.rendering.rivals import (
+from tactileq.benches.rendering.rivals import (
     AR,
     COMPILED,
     DIRECT_FORM_I,
@@ -47,7 +47,7 @@ from benches.rendering.rivals import (
     layered_texture,
     operations,
 )
-from modeling.rendering.plan import RenderPlan
+from tactileq.modeling.rendering.plan import RenderPlan
 
 PARTS_TOLD: list[str] = []
 EFFORT = BenchEffort(samples=1024, turns=2, starts=1)
@@ -152,7 +152,7 @@ def test_ratios_and_verdicts_of_known_times() -> None:
         assert not verdicts["sosfilt / Renderer", f"layers {layers}, blocks of 32"]
         assert verdicts["sosfilt / Renderer", f"layers {layers}, blocks of 1024"]
     assert verdicts["cost is linear in layers: R²"].all()
-    assert not verdicts["import modeling, s"].any()
+    assert not verdicts["import tactileq.modeling, s"].any()
 
 
 @pytest.mark.parametrize("layers", LAYERS)

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from benches.rendering.coefficients import tabled_predictor
-from benches.rendering.rivals import (
+from tactileq.benches.rendering.coefficients import tabled_predictor
+from tactileq.benches.rendering.rivals import (
     AR,
     COMPILED,
     DIRECT_FORM_I,
@@ -26,9 +26,9 @@ from benches.rendering.rivals import (
     layered_texture,
     predictor_of,
 )
-from modeling import InputError, Renderer, TextureModel
-from modeling.arrays import Floats
-from modeling.rendering.noise import stream_key, white_noise
+from tactileq.modeling import InputError, Renderer, TextureModel
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.rendering.noise import stream_key, white_noise
 from tests.refusals import refused
 
 KEY = stream_key(3)
@@ -232,12 +232,12 @@ def test_sosfilt_draws_unit_noise_and_goes_on_where_it_stopped() -> None:
 
 def test_memory_grows_by_whole_layers() -> None:
     few, more, many = (stream(KERNEL, layered_texture(m), 5).kernel_bytes for m in (4, 8, 16))
-    ffi, lib = compiled_parts("modeling.rendering._kernel")
+    ffi, lib = compiled_parts("tactileq.modeling.rendering._kernel")
     assert more - few == 4 * lib.TQ_ROWS * ffi.sizeof("double")
     assert many - more == 2 * (more - few)
     assert few > 4 * lib.TQ_ROWS * ffi.sizeof("double")
 
 
 def test_without_a_compiler_the_sentence_says_what_to_do() -> None:
-    with refused(InputError, expected="analysis._absent", got=["none", "C compiler"]):
-        compiled_parts("analysis._absent")
+    with refused(InputError, expected="tactileq.analysis._absent", got=["none", "C compiler"]):
+        compiled_parts("tactileq.analysis._absent")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benches.rendering.accuracy import stroke
-from benches.rendering.stability import (
+from tactileq.benches.rendering.accuracy import stroke
+from tactileq.benches.rendering.stability import (
     CENTRES_HZ,
     DIRECT,
     FORMS,
@@ -19,11 +19,11 @@ from benches.rendering.stability import (
     moving_variances,
     simulate,
 )
-from modeling import PEQ
-from modeling.arrays import Floats
-from modeling.equalizer.bands import band_response, band_rms
-from modeling.models.parameter_table import Parameters
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import PEQ
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.bands import band_response, band_rms
+from tactileq.modeling.models.parameter_table import Parameters
+from tactileq.stimuli.planted.textures import planted_texture
 
 RATE_HZ = 5000.0
 JUMPS, ANYWHERE = "jumping 20 ↔ 1500 Hz", "random jumps"

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benches.rendering.rivals import SoundStream, layered_texture
-from benches.rendering.stored_sounds import Grains, Loops, grains_of, make_loops
-from modeling import Recording
-from modeling.arrays import Floats
-from modeling.recordings.spectrum import prepare
-from modeling.similarity import log_spectral_distance_db
-from stimuli.planted.textures import planted_texture, record_texture
+from tactileq.benches.rendering.rivals import SoundStream, layered_texture
+from tactileq.benches.rendering.stored_sounds import Grains, Loops, grains_of, make_loops
+from tactileq.modeling import Recording
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.recordings.spectrum import prepare
+from tactileq.modeling.similarity import log_spectral_distance_db
+from tactileq.stimuli.planted.textures import planted_texture, record_texture
 
 RATE_HZ = 5000.0
 SPEEDS, FORCES = np.array([50.0, 150.0, 350.0]), np.array([0.5, 1.5, 3.5])

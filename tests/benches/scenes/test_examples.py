@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benches.chart.rival_costs import coefficients_cost
-from benches.scenes.examples import (
+from tactileq.benches.chart.rival_costs import coefficients_cost
+from tactileq.benches.scenes.examples import (
     DRAWN_EXAMPLE,
     FULL_MODEL,
     LEAST,
@@ -19,12 +19,12 @@ from benches.scenes.examples import (
     drawn_example,
     example,
 )
-from benches.scenes.section import scene_section
-from modeling import Scene, compile_scene, fit_ar
-from modeling.scenes.hands import HandRange
-from modeling.scenes.places import places_of
-from modeling.scenes.strokes import windows_kept
-from stimuli.planted.textures import TEXTURES, PlantedSurface, planted_texture, record_texture
+from tactileq.benches.scenes.section import scene_section
+from tactileq.modeling import Scene, compile_scene, fit_ar
+from tactileq.modeling.scenes.hands import HandRange
+from tactileq.modeling.scenes.places import places_of
+from tactileq.modeling.scenes.strokes import windows_kept
+from tactileq.stimuli.planted.textures import TEXTURES, PlantedSurface, planted_texture, record_texture
 
 
 def test_the_scenes_that_ship_are_those_that_the_report_shows() -> None:

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.statistics.participants.posterior import Effort
-from benches.validation import model as validation_model
-from benches.validation import ranks as validation_ranks
-from benches.validation.model import (
+from tactileq.analysis.statistics.participants.posterior import Effort
+from tactileq.benches.validation import model as validation_model
+from tactileq.benches.validation import ranks as validation_ranks
+from tactileq.benches.validation.model import (
     MODEL_COLUMNS,
     aims,
     all_situations,
@@ -18,8 +18,8 @@ from benches.validation.model import (
     model_table,
     simulate_model_cell,
 )
-from benches.validation.people.held_out import HELD_OUT
-from benches.validation.ranks import simulate_ranks
+from tactileq.benches.validation.people.held_out import HELD_OUT
+from tactileq.benches.validation.ranks import simulate_ranks
 
 
 @pytest.fixture(autouse=True)

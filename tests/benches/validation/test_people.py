@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from benches.validation.people import held_out
-from benches.validation.people.choices import strongest_shares, triangular_share
-from benches.validation.people.held_out import HELD_OUT
-from benches.validation.people.situations import (
+from tactileq.benches.validation.people import held_out
+from tactileq.benches.validation.people.choices import strongest_shares, triangular_share
+from tactileq.benches.validation.people.held_out import HELD_OUT
+from tactileq.benches.validation.people.situations import (
     CHOICE_KIND,
     ODDITY_KIND,
     RATING_KIND,
     SITUATIONS,
     DrawnStudies,
 )
-from modeling.arrays import Floats
+from tactileq.modeling.arrays import Floats
 
 ALL = {**SITUATIONS, **{f"{name} (held out)": one for name, one in HELD_OUT.items()}}
 STUDIES, PEOPLE = 100, 50

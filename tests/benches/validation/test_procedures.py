@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.statistics.rates import clopper_pearson
-from benches.validation.procedures import cells, equivalence_power, simulate_cell
-from benches.validation.worlds import RATE_WORLDS, RATING_WORLDS
-from modeling import InputError
+from tactileq.analysis.statistics.rates import clopper_pearson
+from tactileq.benches.validation.procedures import cells, equivalence_power, simulate_cell
+from tactileq.benches.validation.worlds import RATE_WORLDS, RATING_WORLDS
+from tactileq.modeling import InputError
 from tests.refusals import refused
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pandas as pd
 
-from analysis.page.page import Fold, Table
-from benches.validation.model import MODEL_COLUMNS
-from benches.validation.procedures import cells, simulate_cell, validation_table
-from benches.validation.ranks import RANK_COLUMNS
-from benches.validation.section import validation_section
+from tactileq.analysis.page.page import Fold, Table
+from tactileq.benches.validation.model import MODEL_COLUMNS
+from tactileq.benches.validation.procedures import cells, simulate_cell, validation_table
+from tactileq.benches.validation.ranks import RANK_COLUMNS
+from tactileq.benches.validation.section import validation_section
 
 # What the model of the participants said, and its ranks: two rows, one of which misses an aim.
 OF_MODEL = pd.DataFrame(

@@ -20,15 +20,15 @@ import time
 
 from psychopy import visual
 
-from experiments.console.console import Console
-from experiments.sessions.people import Intake, SessionAborted
-from experiments.sessions.surfaces import Surfaces
-from experiments.study.questions import Question
-from experiments.tasks.absolute import AbsoluteTrial
-from experiments.tasks.oddity import OddityTrial
-from experiments.tasks.relative import RelativeTrial
-from rig.twin import SimulatedRig
-from stimuli.planted.textures import planted_texture
+from tactileq.experiments.console.console import Console
+from tactileq.experiments.sessions.people import Intake, SessionAborted
+from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.study.questions import Question
+from tactileq.experiments.tasks.absolute import AbsoluteTrial
+from tactileq.experiments.tasks.oddity import OddityTrial
+from tactileq.experiments.tasks.relative import RelativeTrial
+from tactileq.rig.twin import SimulatedRig
+from tactileq.stimuli.planted.textures import planted_texture
 
 QUESTIONS = (
     Question(name="age", least=18, most=99),

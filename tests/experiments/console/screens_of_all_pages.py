@@ -17,21 +17,21 @@ from psychopy import visual
 from pyglet import gl
 from pyglet.window import key
 
-from experiments.console import page_runner
-from experiments.console.console import Console
-from experiments.console.drawing import HALF_RISE
-from experiments.console.languages import Texts
-from experiments.sessions.people import Intake, SessionAborted
-from experiments.sessions.surfaces import Surfaces
-from experiments.study.questions import MOST_LEVELS, Question
-from experiments.study.study import Study
-from experiments.tasks.absolute import AbsoluteTrial
-from experiments.tasks.oddity import OddityTrial
-from experiments.tasks.relative import RelativeTrial
-from experiments.tasks.threshold import ThresholdTrial
-from rig.interface import ToneBurst
-from rig.twin import SimulatedRig
-from stimuli.planted.textures import planted_texture
+from tactileq.experiments.console import page_runner
+from tactileq.experiments.console.console import Console
+from tactileq.experiments.console.drawing import HALF_RISE
+from tactileq.experiments.console.languages import Texts
+from tactileq.experiments.sessions.people import Intake, SessionAborted
+from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.study.questions import MOST_LEVELS, Question
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.tasks.absolute import AbsoluteTrial
+from tactileq.experiments.tasks.oddity import OddityTrial
+from tactileq.experiments.tasks.relative import RelativeTrial
+from tactileq.experiments.tasks.threshold import ThresholdTrial
+from tactileq.rig.interface import ToneBurst
+from tactileq.rig.twin import SimulatedRig
+from tactileq.stimuli.planted.textures import planted_texture
 
 drawn = []
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from experiments.console.languages import Texts
+from tactileq.experiments.console.languages import Texts
 from tests.experiments.driven import Driven
 
 DRIVER = Path(__file__).with_name("console_session.py")

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from experiments.console import languages as module
-from experiments.console.drawing import NARROW_EM, NOT_FIRST, NOT_LAST, wrapped
-from experiments.console.languages import Texts, languages, require_texts
-from experiments.console.page_runner import REASONS
-from experiments.study.questions import Question
-from experiments.study.study import Study
-from modeling import InputError
+from tactileq.experiments.console import languages as module
+from tactileq.experiments.console.drawing import NARROW_EM, NOT_FIRST, NOT_LAST, wrapped
+from tactileq.experiments.console.languages import Texts, languages, require_texts
+from tactileq.experiments.console.page_runner import REASONS
+from tactileq.experiments.study.questions import Question
+from tactileq.experiments.study.study import Study
+from tactileq.modeling import InputError
 from tests.refusals import refused
 
 

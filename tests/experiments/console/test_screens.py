@@ -12,11 +12,11 @@ from typing import Any
 
 import pytest
 
-from experiments.console import screens
-from experiments.console.drawing import BLUE, CONSOLE_ORANGE
-from experiments.console.languages import Texts, languages
-from experiments.study.study import Study
-from modeling import InputError
+from tactileq.experiments.console import screens
+from tactileq.experiments.console.drawing import BLUE, CONSOLE_ORANGE
+from tactileq.experiments.console.languages import Texts, languages
+from tactileq.experiments.study.study import Study
+from tactileq.modeling import InputError
 from tests.refusals import refused
 
 ROOT = Path(__file__).parents[3]

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.console.selftest import PRESSES, Timing, time_presentations, time_syncs
-from experiments.study.models import ModelSets
-from modeling import InputError
-from rig.interface import Fault
+from tactileq.experiments.console.selftest import PRESSES, Timing, time_presentations, time_syncs
+from tactileq.experiments.study.models import ModelSets
+from tactileq.modeling import InputError
+from tactileq.rig.interface import Fault
 from tests.refusals import refused
 
 

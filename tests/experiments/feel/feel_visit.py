@@ -13,14 +13,14 @@ import sys
 
 import numpy as np
 
-from experiments.feel import panels, window
-from experiments.feel.plots import LiveText
-from experiments.feel.rigs import HandNow, OutputNow
-from experiments.feel.textures import Texture
-from experiments.feel.view import FeltCriterion
-from experiments.feel.visit import Visit
-from modeling import Threshold, simplify
-from stimuli.planted.textures import planted_texture
+from tactileq.experiments.feel import panels, window
+from tactileq.experiments.feel.plots import LiveText
+from tactileq.experiments.feel.rigs import HandNow, OutputNow
+from tactileq.experiments.feel.textures import Texture
+from tactileq.experiments.feel.view import FeltCriterion
+from tactileq.experiments.feel.visit import Visit
+from tactileq.modeling import Threshold, simplify
+from tactileq.stimuli.planted.textures import planted_texture
 
 live_texts = []
 pointed = set()

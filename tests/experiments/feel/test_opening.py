@@ -12,18 +12,18 @@ from typing import Any
 
 import pytest
 
-from experiments.feel import opening
-from experiments.feel.live_rig import LiveRig
-from experiments.feel.opening import NO_SOUND, demonstration, desk
-from modeling import InputError, TextureModel, compensation_for
-from rig.force.standin import StandIn
-from rig.live.clock import now_s, sleep
-from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, HEARTBEAT_S, Live
-from rig.setup.rig_file import SHIPPED_RIG_FILE
-from rig.sound.devices import SoundDevice
-from rig.sound.supervision import SoundLost
-from stimuli.planted.textures import planted_texture
-from stimuli.planted.vibrators import planted_vibrator
+from tactileq.experiments.feel import opening
+from tactileq.experiments.feel.live_rig import LiveRig
+from tactileq.experiments.feel.opening import NO_SOUND, demonstration, desk
+from tactileq.modeling import InputError, TextureModel, compensation_for
+from tactileq.rig.force.standin import StandIn
+from tactileq.rig.live.clock import now_s, sleep
+from tactileq.rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, HEARTBEAT_S, Live
+from tactileq.rig.setup.rig_file import SHIPPED_RIG_FILE
+from tactileq.rig.sound.devices import SoundDevice
+from tactileq.rig.sound.supervision import SoundLost
+from tactileq.stimuli.planted.textures import planted_texture
+from tactileq.stimuli.planted.vibrators import planted_vibrator
 from tests.refusals import refused
 from tests.rig.force.rig_files import force_rig
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from experiments.feel.textures import Texture, load_textures
-from modeling import InputError, Threshold, fit_ar, regressed, simplify
-from stimuli.planted.textures import planted_texture, record_texture
+from tactileq.experiments.feel.textures import Texture, load_textures
+from tactileq.modeling import InputError, Threshold, fit_ar, regressed, simplify
+from tactileq.stimuli.planted.textures import planted_texture, record_texture
 from tests.refusals import refused
 
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.feel.rigs import NO_HAND, HandNow, OutputNow
-from experiments.feel.textures import Texture
-from experiments.feel.view import (
+from tactileq.experiments.feel.rigs import NO_HAND, HandNow, OutputNow
+from tactileq.experiments.feel.textures import Texture
+from tactileq.experiments.feel.view import (
     FeltCriterion,
     amplitude_range,
     felt_words,
@@ -22,10 +22,10 @@ from experiments.feel.view import (
     spectrum_range,
     texture_now,
 )
-from modeling import Renderer, TextureModel, Threshold, regressed, simplify
-from modeling.models.loading import Layered
-from modeling.perception.verdicts import CRITERIA, CriterionName
-from stimuli.planted.textures import CATALOGUE, planted_texture
+from tactileq.modeling import Renderer, TextureModel, Threshold, regressed, simplify
+from tactileq.modeling.models.loading import Layered
+from tactileq.modeling.perception.verdicts import CRITERIA, CriterionName
+from tactileq.stimuli.planted.textures import CATALOGUE, planted_texture
 
 FLAT = Threshold("flat", [10.0, 400.0], [0.1, 0.1], "decree", "none")
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from experiments.feel.rigs import NO_HAND, HandNow
-from experiments.feel.textures import Texture
-from experiments.feel.visit import Visit
-from modeling import Threshold, simplify
-from modeling.models.loading import Layered
-from stimuli.planted.textures import planted_texture
+from tactileq.experiments.feel.rigs import NO_HAND, HandNow
+from tactileq.experiments.feel.textures import Texture
+from tactileq.experiments.feel.visit import Visit
+from tactileq.modeling import Threshold, simplify
+from tactileq.modeling.models.loading import Layered
+from tactileq.stimuli.planted.textures import planted_texture
 
 
 @dataclass

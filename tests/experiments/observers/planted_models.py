@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from modeling import TextureModel, Threshold
+from tactileq.modeling import TextureModel, Threshold
 
 
 def flat_threshold(level_g: float, low_hz: float = 1.0, high_hz: float = 2000.0) -> Threshold:

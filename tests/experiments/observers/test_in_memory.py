@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.observers.in_memory import simulate_sessions
-from experiments.observers.percepts import Perception
-from experiments.observers.psychometrics import Psychometrics
-from experiments.study.models import ModelSets
-from experiments.study.study import Study
-from experiments.study.task_plan import TaskPlan
-from modeling import InputError, TextureModel, Threshold
-from modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.experiments.observers.in_memory import simulate_sessions
+from tactileq.experiments.observers.percepts import Perception
+from tactileq.experiments.observers.psychometrics import Psychometrics
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.study.task_plan import TaskPlan
+from tactileq.modeling import InputError, TextureModel, Threshold
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
 from tests.refusals import refused
 
 

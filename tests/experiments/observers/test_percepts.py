@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from experiments.observers.percepts import (
+from tactileq.experiments.observers.percepts import (
     BAND_EDGES_HZ,
     STROKES,
     Distance,
@@ -18,10 +18,10 @@ from experiments.observers.percepts import (
     distance,
     sensation_levels,
 )
-from experiments.study.models import ModelSets
-from experiments.study.study import Study
-from modeling import InputError, TextureModel, Threshold
-from modeling.models.ar_model import ARModel
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.study import Study
+from tactileq.modeling import InputError, TextureModel, Threshold
+from tactileq.modeling.models.ar_model import ARModel
 from tests.experiments.observers.planted_models import flat_threshold, texture_model
 from tests.refusals import refused
 from tests.rig.planted import planted_stimulus

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
 
-from experiments.observers.psychometrics import (
+from tactileq.experiments.observers.psychometrics import (
     EFFECTS,
     Psychometrics,
     SimulatedPerson,
@@ -20,9 +20,9 @@ from experiments.observers.psychometrics import (
     choice_shares,
     with_effect,
 )
-from modeling import InputError
-from modeling.participants.ratings import RatingPriors
-from modeling.seeds import generator
+from tactileq.modeling import InputError
+from tactileq.modeling.participants.ratings import RatingPriors
+from tactileq.modeling.seeds import generator
 from tests.refusals import refused
 
 TRAITS = (

@@ -10,23 +10,23 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from experiments.observers.percepts import Perception, distance, sensation_levels
-from experiments.observers.psychometrics import RATED_SCALES, Psychometrics, Trait, choice_shares
-from experiments.observers.simulated import SimulatedParticipant, require_plantable
-from experiments.sessions.people import Intake
-from experiments.sessions.surfaces import Surfaces
-from experiments.study.models import ModelSets
-from experiments.study.questions import Question
-from experiments.study.study import Study
-from experiments.tasks.absolute import AbsoluteTrial
-from experiments.tasks.oddity import OddityTrial
-from experiments.tasks.relative import RelativeTrial
-from experiments.tasks.threshold import ThresholdTrial
-from modeling import InputError, TextureModel, Threshold
-from modeling.participants.choices import oddity_share
-from modeling.participants.ratings import AT_END
-from rig.interface import ToneBurst
-from rig.twin import SimulatedRig
+from tactileq.experiments.observers.percepts import Perception, distance, sensation_levels
+from tactileq.experiments.observers.psychometrics import RATED_SCALES, Psychometrics, Trait, choice_shares
+from tactileq.experiments.observers.simulated import SimulatedParticipant, require_plantable
+from tactileq.experiments.sessions.people import Intake
+from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.questions import Question
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.tasks.absolute import AbsoluteTrial
+from tactileq.experiments.tasks.oddity import OddityTrial
+from tactileq.experiments.tasks.relative import RelativeTrial
+from tactileq.experiments.tasks.threshold import ThresholdTrial
+from tactileq.modeling import InputError, TextureModel, Threshold
+from tactileq.modeling.participants.choices import oddity_share
+from tactileq.modeling.participants.ratings import AT_END
+from tactileq.rig.interface import ToneBurst
+from tactileq.rig.twin import SimulatedRig
 from tests.refusals import refused
 
 EXACT = Psychometrics(

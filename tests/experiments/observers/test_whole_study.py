@@ -7,13 +7,13 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from experiments import Study, simulate_study
-from experiments.observers.in_memory import simulate_sessions
-from experiments.observers.percepts import Perception
-from experiments.observers.psychometrics import Psychometrics
-from experiments.study.models import ModelSets
-from modeling import InputError, TextureModel, Threshold
-from rig.twin import SimulatedRig
+from tactileq.experiments import Study, simulate_study
+from tactileq.experiments.observers.in_memory import simulate_sessions
+from tactileq.experiments.observers.percepts import Perception
+from tactileq.experiments.observers.psychometrics import Psychometrics
+from tactileq.experiments.study.models import ModelSets
+from tactileq.modeling import InputError, TextureModel, Threshold
+from tactileq.rig.twin import SimulatedRig
 from tests.refusals import refused
 
 

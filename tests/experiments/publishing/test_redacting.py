@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.publishing.presented import render_presentation
-from experiments.publishing.redacting import LEFT_OUT, redact
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.session_store import SessionStore
-from experiments.sessions.stored_sessions import held_sessions
-from experiments.study.models import ModelSets
-from experiments.verification.verifying import verify_data
-from modeling import InputError
+from tactileq.experiments.publishing.presented import render_presentation
+from tactileq.experiments.publishing.redacting import LEFT_OUT, redact
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.session_store import SessionStore
+from tactileq.experiments.sessions.stored_sessions import held_sessions
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.verification.verifying import verify_data
+from tactileq.modeling import InputError
 from tests.experiments.verification.small_studies import (
     Stopping,
     eventful_study,

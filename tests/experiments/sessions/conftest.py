@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.sessions.files import SessionFiles
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.program import program_facts
-from experiments.sessions.roster import Roster
-from experiments.sessions.session_store import SessionStore
-from modeling.files.hashes import sha256_of_values
-from rig.interface import HandRows, PresentationRecord
+from tactileq.experiments.sessions.files import SessionFiles
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.program import program_facts
+from tactileq.experiments.sessions.roster import Roster
+from tactileq.experiments.sessions.session_store import SessionStore
+from tactileq.modeling.files.hashes import sha256_of_values
+from tactileq.rig.interface import HandRows, PresentationRecord
 from tests.experiments.sessions.enrolling import enrolled
 
 SURFACES = ("canvas", 'say "velvet", or', "和紙")

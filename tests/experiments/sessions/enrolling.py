@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from experiments.sessions.roster import Roster, RosterEntry
+from tactileq.experiments.sessions.roster import Roster, RosterEntry
 
 
 def enrolled(roster: Roster, subject: int | None, participants: int, **kind: Any) -> RosterEntry:

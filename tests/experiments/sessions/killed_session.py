@@ -21,13 +21,13 @@ from pathlib import Path
 import filelock  # noqa: F401  # once, and not in each of a hundred children
 import numpy as np
 
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.resume import resumption
-from experiments.sessions.roster import Roster
-from experiments.sessions.session_store import SessionStore
-from modeling import InputError
-from modeling.files.hashes import sha256_of_values
-from rig.interface import HandRows, PresentationRecord
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.resume import resumption
+from tactileq.experiments.sessions.roster import Roster
+from tactileq.experiments.sessions.session_store import SessionStore
+from tactileq.modeling import InputError
+from tactileq.modeling.files.hashes import sha256_of_values
+from tactileq.rig.interface import HandRows, PresentationRecord
 
 CALLS = ("write", "fsync", "replace", "ftruncate", "mkdir", "open")
 ROWS = HandRows(

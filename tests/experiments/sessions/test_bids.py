@@ -17,30 +17,30 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.observers.whole_study import simulate_study
-from experiments.sessions.bids import (
+from tactileq.experiments.observers.whole_study import simulate_study
+from tactileq.experiments.sessions.bids import (
     Exported,
     differing_tables,
     export_all,
     export_session,
     require_tables,
 )
-from experiments.sessions.bids_events import onsets_s
-from experiments.sessions.bids_physio import RATE_HZ, at_regular_times
-from experiments.sessions.bids_tables import cell, table_bytes
-from experiments.sessions.files import SessionFiles
-from experiments.sessions.log import Log, read_log
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.session_store import SessionStore
-from experiments.sessions.stored_sessions import held_sessions
-from experiments.study.models import ModelSets
-from experiments.study.study import Study
-from experiments.study.task_plan import TaskPlan
-from modeling import InputError, simplify
-from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.columns import Column
-from modeling.files.tables import guarded
-from rig.twin import SimulatedRig
+from tactileq.experiments.sessions.bids_events import onsets_s
+from tactileq.experiments.sessions.bids_physio import RATE_HZ, at_regular_times
+from tactileq.experiments.sessions.bids_tables import cell, table_bytes
+from tactileq.experiments.sessions.files import SessionFiles
+from tactileq.experiments.sessions.log import Log, read_log
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.session_store import SessionStore
+from tactileq.experiments.sessions.stored_sessions import held_sessions
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.study.task_plan import TaskPlan
+from tactileq.modeling import InputError, simplify
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.files.columns import Column
+from tactileq.modeling.files.tables import guarded
+from tactileq.rig.twin import SimulatedRig
 from tactileq.bids_validator import bids_issues
 from tests.experiments.sessions.conftest import STUDY, session_on_disk
 from tests.refusals import refused
@@ -551,7 +551,7 @@ def test_after_a_session_only_its_participants_logs_are_read(
         read.append(Path(path).name[:6])
         return read_log(path)
 
-    monkeypatch.setattr("experiments.sessions.state.read_log", noted)
+    monkeypatch.setattr("tactileq.experiments.sessions.state.read_log", noted)
     export_session(second.root, second.manifest)
     assert set(read) == {"sub-02"}
     monkeypatch.undo()

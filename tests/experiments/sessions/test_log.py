@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.sessions.log import line_of, read_log
-from modeling import InputError
+from tactileq.experiments.sessions.log import line_of, read_log
+from tactileq.modeling import InputError
 from tests.refusals import refused
 
 TEXTS = st.text(st.characters(), max_size=30)  # halves of surrogate pairs among them

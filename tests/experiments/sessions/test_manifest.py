@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.sessions import program
-from experiments.sessions.manifest import SessionManifest
-from modeling import InputError
+from tactileq.experiments.sessions import program
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.modeling import InputError
 from tests.refusals import refused
 
 ManifestOf = Callable[..., SessionManifest]

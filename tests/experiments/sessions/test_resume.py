@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.sessions.log import Log, utc_text
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.program import program_facts
-from experiments.sessions.resume import Resumption, resumption
-from experiments.sessions.state import SessionState, state_of
-from modeling.files.hashes import sha256_of_values
+from tactileq.experiments.sessions.log import Log, utc_text
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.program import program_facts
+from tactileq.experiments.sessions.resume import Resumption, resumption
+from tactileq.experiments.sessions.state import SessionState, state_of
+from tactileq.modeling.files.hashes import sha256_of_values
 
 ManifestOf = Callable[..., SessionManifest]
 BEGUN = datetime(2026, 11, 22, 9, 0, tzinfo=UTC)

@@ -14,11 +14,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.sessions.roster import Roster
-from experiments.sessions.writer import StoreError
-from modeling import InputError
-from modeling.files import places
-from modeling.files.reading import reason_of
+from tactileq.experiments.sessions.roster import Roster
+from tactileq.experiments.sessions.writer import StoreError
+from tactileq.modeling import InputError
+from tactileq.modeling.files import places
+from tactileq.modeling.files.reading import reason_of
 from tests.experiments.sessions.enrolling import enrolled
 from tests.refusals import refused
 

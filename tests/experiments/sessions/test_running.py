@@ -14,29 +14,29 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.sessions import program
-from experiments.sessions.bids import export_all, export_session
-from experiments.sessions.log import read_log
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.people import Intake, Rating, SessionAborted
-from experiments.sessions.roster import Roster
-from experiments.sessions.running import Circumstances, run_session
-from experiments.sessions.session_store import SessionStore
-from experiments.sessions.state import session_state
-from experiments.sessions.status import study_progress
-from experiments.sessions.surfaces import Surfaces
-from experiments.sessions.trial_loop import People, SessionResult
-from experiments.sessions.writer import StoreError
-from experiments.study.models import ModelSets
-from experiments.study.questions import Question
-from experiments.study.study import Consent, Study
-from experiments.study.task_plan import TaskPlan
-from experiments.tasks import plan_session, task_named
-from modeling import InputError
-from modeling.files.locks import is_held
-from modeling.files.places import LOCK_NAME
-from modeling.files.reading import reason_of
-from rig.twin import SimulatedRig
+from tactileq.experiments.sessions import program
+from tactileq.experiments.sessions.bids import export_all, export_session
+from tactileq.experiments.sessions.log import read_log
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.people import Intake, Rating, SessionAborted
+from tactileq.experiments.sessions.roster import Roster
+from tactileq.experiments.sessions.running import Circumstances, run_session
+from tactileq.experiments.sessions.session_store import SessionStore
+from tactileq.experiments.sessions.state import session_state
+from tactileq.experiments.sessions.status import study_progress
+from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.sessions.trial_loop import People, SessionResult
+from tactileq.experiments.sessions.writer import StoreError
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.questions import Question
+from tactileq.experiments.study.study import Consent, Study
+from tactileq.experiments.study.task_plan import TaskPlan
+from tactileq.experiments.tasks import plan_session, task_named
+from tactileq.modeling import InputError
+from tactileq.modeling.files.locks import is_held
+from tactileq.modeling.files.places import LOCK_NAME
+from tactileq.modeling.files.reading import reason_of
+from tactileq.rig.twin import SimulatedRig
 from tests.experiments.scripted import Ready, Scripted
 from tests.experiments.sealing import change_text
 from tests.refusals import refused

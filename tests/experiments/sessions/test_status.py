@@ -6,12 +6,12 @@ from datetime import datetime, timedelta
 
 import pytest
 
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.roster import Roster
-from experiments.sessions.session_store import SessionStore
-from experiments.sessions.status import TaskProgress, study_progress
-from experiments.sessions.withdrawing import drop_out, withdraw
-from modeling import InputError
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.roster import Roster
+from tactileq.experiments.sessions.session_store import SessionStore
+from tactileq.experiments.sessions.status import TaskProgress, study_progress
+from tactileq.experiments.sessions.withdrawing import drop_out, withdraw
+from tactileq.modeling import InputError
 from tests.refusals import refused
 
 TODAY = datetime.now().astimezone().date()

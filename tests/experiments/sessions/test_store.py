@@ -19,21 +19,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.sessions import admission, log
-from experiments.sessions.data_set import DESCRIPTION_NAME
-from experiments.sessions.files import SessionFiles, sessions_in
-from experiments.sessions.log import line_of, read_log
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.overrides import Overrides
-from experiments.sessions.session_store import SessionStore
-from experiments.sessions.state import session_state
-from experiments.sessions.store import MemoryStore, Store
-from experiments.sessions.tables import GrowingTable, cell
-from experiments.sessions.writer import StoreError
-from modeling import InputError
-from modeling.files.columns import Column
-from modeling.files.reading import reason_of
-from rig.interface import Acceleration, HandRows, PresentationRecord
+from tactileq.experiments.sessions import admission, log
+from tactileq.experiments.sessions.data_set import DESCRIPTION_NAME
+from tactileq.experiments.sessions.files import SessionFiles, sessions_in
+from tactileq.experiments.sessions.log import line_of, read_log
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.overrides import Overrides
+from tactileq.experiments.sessions.session_store import SessionStore
+from tactileq.experiments.sessions.state import session_state
+from tactileq.experiments.sessions.store import MemoryStore, Store
+from tactileq.experiments.sessions.tables import GrowingTable, cell
+from tactileq.experiments.sessions.writer import StoreError
+from tactileq.modeling import InputError
+from tactileq.modeling.files.columns import Column
+from tactileq.modeling.files.reading import reason_of
+from tactileq.rig.interface import Acceleration, HandRows, PresentationRecord
 from tests.refusals import check_refusal, refused
 
 FileSizeLimit = Callable[[int], AbstractContextManager[None]]

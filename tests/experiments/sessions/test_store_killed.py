@@ -13,13 +13,13 @@ from pathlib import Path
 
 import pytest
 
-from experiments.sessions.files import SessionFiles
-from experiments.sessions.log import line_of, read_log
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.resume import Resumption, resumption
-from experiments.sessions.roster import Roster
-from experiments.sessions.session_store import SessionStore
-from experiments.sessions.state import session_state
+from tactileq.experiments.sessions.files import SessionFiles
+from tactileq.experiments.sessions.log import line_of, read_log
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.resume import Resumption, resumption
+from tactileq.experiments.sessions.roster import Roster
+from tactileq.experiments.sessions.session_store import SessionStore
+from tactileq.experiments.sessions.state import session_state
 from tests.experiments.sessions.enrolling import enrolled
 
 ManifestOf = Callable[..., SessionManifest]

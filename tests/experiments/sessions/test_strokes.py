@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.sessions.strokes import HOW, Outside, advice_on, outside_grid
-from rig.interface import HandRows, PresentationRecord
+from tactileq.experiments.sessions.strokes import HOW, Outside, advice_on, outside_grid
+from tactileq.rig.interface import HandRows, PresentationRecord
 
 VIRTUAL = PresentationRecord(
     number=3,

@@ -10,19 +10,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.sessions.agenda import Agenda
-from experiments.sessions.people import Intake, Rating, SessionAborted
-from experiments.sessions.store import MemoryStore
-from experiments.sessions.surfaces import Surfaces
-from experiments.sessions.trial_loop import People, SessionResult, run_trials
-from experiments.sessions.writer import StoreError
-from experiments.study.models import ModelSets
-from experiments.study.study import Study
-from experiments.study.task_plan import TaskPlan
-from experiments.tasks import plan_session, task_named
-from modeling import InputError
-from rig.interface import Acceleration, Fault, HandRows, PresentationRecord, ToneBurst
-from rig.twin import SimulatedRig
+from tactileq.experiments.sessions.agenda import Agenda
+from tactileq.experiments.sessions.people import Intake, Rating, SessionAborted
+from tactileq.experiments.sessions.store import MemoryStore
+from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.sessions.trial_loop import People, SessionResult, run_trials
+from tactileq.experiments.sessions.writer import StoreError
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.study.task_plan import TaskPlan
+from tactileq.experiments.tasks import plan_session, task_named
+from tactileq.modeling import InputError
+from tactileq.rig.interface import Acceleration, Fault, HandRows, PresentationRecord, ToneBurst
+from tactileq.rig.twin import SimulatedRig
 from tests.experiments.scripted import Ready, Scripted
 from tests.refusals import refused
 
@@ -342,7 +342,7 @@ def test_a_response_begins_with_the_first_sample_on_whatever_clock_the_rig_has(
     models: ModelSets, rig: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     host = [100.0]
-    monkeypatch.setattr("experiments.sessions.surfaces.time.perf_counter", lambda: host[0])
+    monkeypatch.setattr("tactileq.experiments.sessions.surfaces.time.perf_counter", lambda: host[0])
     rig.now_s = lambda: 7.0
     rig.present_real = lambda texture: 6.75  # the first sample left 0.25 s ago
     surfaces = surfaces_of(rig, [models.of("PVC", "full")])

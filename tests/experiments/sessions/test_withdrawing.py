@@ -13,13 +13,13 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from experiments.sessions import withdrawing
-from experiments.sessions.bids import Exported, export_all
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.roster import Roster
-from experiments.sessions.session_store import SessionStore
-from experiments.sessions.withdrawing import drop_out, files_of, withdraw
-from modeling import InputError
+from tactileq.experiments.sessions import withdrawing
+from tactileq.experiments.sessions.bids import Exported, export_all
+from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.roster import Roster
+from tactileq.experiments.sessions.session_store import SessionStore
+from tactileq.experiments.sessions.withdrawing import drop_out, files_of, withdraw
+from tactileq.modeling import InputError
 from tests.experiments.sessions.enrolling import enrolled
 from tests.refusals import refused
 

@@ -14,8 +14,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.sessions.files import open_file
-from experiments.sessions.writer import LogWriter, StoreError
+from tactileq.experiments.sessions.files import open_file
+from tactileq.experiments.sessions.writer import LogWriter, StoreError
 
 SENTENCES = {
     errno.EIO: "a disk that fails",

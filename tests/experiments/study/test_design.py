@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from experiments.study.design import (
+from tactileq.experiments.study.design import (
     Occasion,
     SessionPlan,
     Trial,
@@ -24,12 +24,12 @@ from experiments.study.design import (
     fisher_yates,
     models_of_session,
 )
-from experiments.study.study import Study
-from experiments.study.task_plan import TaskPlan
-from experiments.tasks import plan_session
-from modeling import InputError
-from modeling.files.claims import PlanSection
-from modeling.files.hashes import sha256_of_values
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.study.task_plan import TaskPlan
+from tactileq.experiments.tasks import plan_session
+from tactileq.modeling import InputError
+from tactileq.modeling.files.claims import PlanSection
+from tactileq.modeling.files.hashes import sha256_of_values
 from tests.refusals import refused
 
 SEEDS = range(200)

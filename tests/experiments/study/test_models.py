@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.study.models import ModelSets, load_model_sets
-from experiments.study.study import Study
-from modeling import ARModel, InputError, TextureModel, Threshold, regressed, simplify
-from modeling.models.compiled_for import CompiledFor
-from stimuli.planted.textures import planted_texture
-from stimuli.sets.recipe import Recipe
-from stimuli.sets.writing import write_set
+from tactileq.experiments.study.models import ModelSets, load_model_sets
+from tactileq.experiments.study.study import Study
+from tactileq.modeling import ARModel, InputError, TextureModel, Threshold, regressed, simplify
+from tactileq.modeling.models.compiled_for import CompiledFor
+from tactileq.stimuli.planted.textures import planted_texture
+from tactileq.stimuli.sets.recipe import Recipe
+from tactileq.stimuli.sets.writing import write_set
 from tests.refusals import refused
 
 SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}

@@ -8,14 +8,14 @@ from typing import Annotated, Any
 
 import pytest
 
-from experiments.study.questions import Question
-from experiments.study.study import SHIPPED_STUDY, Consent, Study, plan_sha256
-from experiments.study.task_plan import TaskPlan
-from modeling import InputError
-from modeling.files.answer_tables import ANSWER_TABLES, RESPONSE_TIME, answer_table
-from modeling.files.claims import ClaimSection, PlanSection
-from modeling.files.described import FileSection, key
-from modeling.files.describing import key_tables, schema
+from tactileq.experiments.study.questions import Question
+from tactileq.experiments.study.study import SHIPPED_STUDY, Consent, Study, plan_sha256
+from tactileq.experiments.study.task_plan import TaskPlan
+from tactileq.modeling import InputError
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES, RESPONSE_TIME, answer_table
+from tactileq.modeling.files.claims import ClaimSection, PlanSection
+from tactileq.modeling.files.described import FileSection, key
+from tactileq.modeling.files.describing import key_tables, schema
 from tests.refusals import refused
 
 

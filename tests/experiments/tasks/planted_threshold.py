@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.sessions.people import Choice
-from experiments.sessions.surfaces import Surfaces
-from experiments.tasks.threshold import FREQUENCIES_HZ, ThresholdTrial
-from experiments.tasks.threshold_posterior import Answer, next_level_db
-from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.tables import write_table
+from tactileq.experiments.sessions.people import Choice
+from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.tasks.threshold import FREQUENCIES_HZ, ThresholdTrial
+from tactileq.experiments.tasks.threshold_posterior import Answer, next_level_db
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.files.tables import write_table
 from tests.experiments.scripted import Scripted
 
 HIGHEST_DB = 14.0

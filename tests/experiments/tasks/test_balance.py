@@ -7,25 +7,25 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.observers.in_memory import simulate_sessions
-from experiments.observers.percepts import Perception
-from experiments.observers.psychometrics import Psychometrics
-from experiments.study.design import SessionPlan
-from experiments.study.models import ModelSets
-from experiments.study.study import Study, plan_sha256
-from experiments.study.task_plan import TaskPlan
-from experiments.tasks import plan_session
-from experiments.tasks.balance import balance_of
-from experiments.tasks.durations import (
+from tactileq.experiments.observers.in_memory import simulate_sessions
+from tactileq.experiments.observers.percepts import Perception
+from tactileq.experiments.observers.psychometrics import Psychometrics
+from tactileq.experiments.study.design import SessionPlan
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.study import Study, plan_sha256
+from tactileq.experiments.study.task_plan import TaskPlan
+from tactileq.experiments.tasks import plan_session
+from tactileq.experiments.tasks.balance import balance_of
+from tactileq.experiments.tasks.durations import (
     TRIAL_S,
     minutes_of_catch_trials,
     minutes_of_session,
     trials_of_session,
 )
-from experiments.tasks.page import plan_page, proof_of_sensitivity
-from modeling import InputError, TextureModel, Threshold
-from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.claims import ClaimSection, PlanSection
+from tactileq.experiments.tasks.page import plan_page, proof_of_sensitivity
+from tactileq.modeling import InputError, TextureModel, Threshold
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.files.claims import ClaimSection, PlanSection
 from tests.refusals import refused
 
 
@@ -55,7 +55,7 @@ def test_a_layout_that_does_not_tell_what_is_right_is_not_counted(
         words = ("same", "different")
         return replace(plan, trials=tuple(replace(each, layout=words) for each in plan.trials))
 
-    monkeypatch.setattr("experiments.tasks.balance.plan_session", with_words)
+    monkeypatch.setattr("tactileq.experiments.tasks.balance.plan_session", with_words)
     assert balance_of(study, "relative") == [
         row for row in counted if not row.what.endswith("a button is correct")
     ]

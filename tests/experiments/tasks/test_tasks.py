@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
-from experiments.sessions.store import MemoryStore
-from experiments.sessions.trial_loop import People, run_trials
-from experiments.study.models import ModelSets
-from experiments.study.study import Study
-from experiments.study.task_plan import TaskPlan
-from experiments.tasks import plan_session, task_named
-from modeling import InputError
-from modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.experiments.sessions.store import MemoryStore
+from tactileq.experiments.sessions.trial_loop import People, run_trials
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.study.task_plan import TaskPlan
+from tactileq.experiments.tasks import plan_session, task_named
+from tactileq.modeling import InputError
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
 from tests.experiments.scripted import Ready, Scripted
 from tests.refusals import refused
 

@@ -8,25 +8,25 @@ from typing import Any
 
 import pytest
 
-from experiments.sessions.agenda import Agenda
-from experiments.sessions.store import MemoryStore
-from experiments.sessions.trial_loop import People, SessionResult, run_trials
-from experiments.study.models import ModelSets
-from experiments.study.study import Study
-from experiments.study.task_plan import TaskPlan
-from experiments.tasks import plan_session
-from experiments.tasks.threshold import (
+from tactileq.experiments.sessions.agenda import Agenda
+from tactileq.experiments.sessions.store import MemoryStore
+from tactileq.experiments.sessions.trial_loop import People, SessionResult, run_trials
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.study.task_plan import TaskPlan
+from tactileq.experiments.tasks import plan_session
+from tactileq.experiments.tasks.threshold import (
     DURATION_S,
     FREQUENCIES_HZ,
     PRACTICE_HZ,
     TASK,
     ThresholdTrial,
 )
-from experiments.tasks.threshold_posterior import LEVELS_DB, answers_of, estimate
-from modeling import InputError
-from modeling.files.answer_tables import ANSWER_TABLES
-from rig.interface import ToneBurst
-from rig.twin import SimulatedRig
+from tactileq.experiments.tasks.threshold_posterior import LEVELS_DB, answers_of, estimate
+from tactileq.modeling import InputError
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.rig.interface import ToneBurst
+from tactileq.rig.twin import SimulatedRig
 from tests.experiments.scripted import Ready
 from tests.experiments.tasks.planted_threshold import Feeling
 from tests.refusals import refused

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from questplus import QuestPlus
 
-from experiments.tasks.threshold_posterior import (
+from tactileq.experiments.tasks.threshold_posterior import (
     EXPECTED_DB,
     EXPECTED_SD_DB,
     LAPSE_RATES,
@@ -26,8 +26,8 @@ from experiments.tasks.threshold_posterior import (
     next_level_db,
     posterior,
 )
-from modeling import InputError
-from modeling.arrays import Floats
+from tactileq.modeling import InputError
+from tactileq.modeling.arrays import Floats
 from tests.experiments.tasks.planted_threshold import HIGHEST_DB, asked, rows_of, weibull
 from tests.refusals import refused
 

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from experiments.tasks.threshold_posterior import Answer, Estimate, answers_of, estimate
-from experiments.tasks.threshold_table import (
+from tactileq.experiments.tasks.threshold_posterior import Answer, Estimate, answers_of, estimate
+from tactileq.experiments.tasks.threshold_table import (
     THRESHOLD_TABLE_COLUMNS,
     mean_thresholds,
     read_answers,
     threshold_text,
 )
-from modeling import InputError, Threshold
-from modeling.files.tables import read_table
+from tactileq.modeling import InputError, Threshold
+from tactileq.modeling.files.tables import read_table
 from tests.experiments.tasks.planted_threshold import rows_of, write_answers
 from tests.refusals import refused
 

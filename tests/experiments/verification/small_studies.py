@@ -16,24 +16,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.observers.experimenter import SimulatedExperimenter
-from experiments.sessions import log
-from experiments.sessions.bids import export_all, export_session
-from experiments.sessions.files import SessionFiles
-from experiments.sessions.people import Choice, Intake, Rating, SessionAborted
-from experiments.sessions.running import Circumstances, run_session
-from experiments.sessions.stored_sessions import held_session
-from experiments.sessions.surfaces import Surfaces
-from experiments.sessions.trial_loop import People, SessionResult
-from experiments.sessions.withdrawing import drop_out, withdraw
-from experiments.study.models import ModelSets
-from experiments.study.questions import Question
-from experiments.study.study import Study
-from experiments.study.task_plan import TaskPlan
-from experiments.tasks import task_named
-from modeling import Simplification, Threshold, simplify
-from rig.twin import SimulatedRig
-from stimuli.planted.textures import planted_texture
+from tactileq.experiments.observers.experimenter import SimulatedExperimenter
+from tactileq.experiments.sessions import log
+from tactileq.experiments.sessions.bids import export_all, export_session
+from tactileq.experiments.sessions.files import SessionFiles
+from tactileq.experiments.sessions.people import Choice, Intake, Rating, SessionAborted
+from tactileq.experiments.sessions.running import Circumstances, run_session
+from tactileq.experiments.sessions.stored_sessions import held_session
+from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.sessions.trial_loop import People, SessionResult
+from tactileq.experiments.sessions.withdrawing import drop_out, withdraw
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.questions import Question
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.study.task_plan import TaskPlan
+from tactileq.experiments.tasks import task_named
+from tactileq.modeling import Simplification, Threshold, simplify
+from tactileq.rig.twin import SimulatedRig
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.experiments.scripted import Scripted
 
 

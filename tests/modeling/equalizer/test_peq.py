@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.linalg import solve_discrete_lyapunov
 from scipy.optimize import brentq
 
-from modeling import PEQ, InputError
-from modeling.equalizer.bands import band_coefficients, clamp_bands, rational_tan
+from tactileq.modeling import PEQ, InputError
+from tactileq.modeling.equalizer.bands import band_coefficients, clamp_bands, rational_tan
 from tests.refusals import refused
 
 RATE_HZ = 5000.0

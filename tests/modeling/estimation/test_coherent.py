@@ -10,10 +10,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from modeling import PEQ
-from modeling.arrays import Floats
-from modeling.equalizer.bands import band_rms
-from modeling.estimation.coherent import (
+from tactileq.modeling import PEQ
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.bands import band_rms
+from tactileq.modeling.estimation.coherent import (
     CANCELLING,
     LARGEST_SHARE,
     Observed,
@@ -27,8 +27,8 @@ from modeling.estimation.coherent import (
     slopes,
     without_layer,
 )
-from modeling.estimation.likelihood import centres_and_widths, signal_power
-from modeling.recordings.spectrum import spectrum_of_samples
+from tactileq.modeling.estimation.likelihood import centres_and_widths, signal_power
+from tactileq.modeling.recordings.spectrum import spectrum_of_samples
 
 RATE_HZ = 5000.0
 SIGNS = st.lists(st.sampled_from([1.0, -1.0]), min_size=4, max_size=4)

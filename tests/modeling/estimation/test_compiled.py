@@ -13,13 +13,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modeling.arrays import Floats
-from modeling.engines import SWITCH
-from modeling.estimation.coherent import Observed, climb, limits_of, response, slopes
-from modeling.estimation.compiled import held_by_cells, is_compiled
-from modeling.estimation.likelihood import Power, bins_near
-from modeling.fitting.blending import Middles
-from modeling.fitting.equations import STEP_OF_CORNERS, cells
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.engines import SWITCH
+from tactileq.modeling.estimation.coherent import Observed, climb, limits_of, response, slopes
+from tactileq.modeling.estimation.compiled import held_by_cells, is_compiled
+from tactileq.modeling.estimation.likelihood import Power, bins_near
+from tactileq.modeling.fitting.blending import Middles
+from tactileq.modeling.fitting.equations import STEP_OF_CORNERS, cells
 
 SOURCE = Path(__file__).with_name("slopes_bits.c")
 HEADER = Path(__file__).parents[3] / "modeling" / "estimation" / "slopes.h"
@@ -261,11 +261,11 @@ def test_without_a_compiler_numpy_calculates_the_same() -> None:
     """A fresh process in which the extension cannot be imported."""
     program = """
 import sys
-sys.modules["modeling.estimation._slopes"] = None
-from modeling.estimation.compiled import held_by_cells, is_compiled
-from modeling.estimation.likelihood import Power, bins_near
-from modeling.fitting.blending import Middles
-from modeling.fitting.equations import STEP_OF_CORNERS, cells
+sys.modules["tactileq.modeling.estimation._slopes"] = None
+from tactileq.modeling.estimation.compiled import held_by_cells, is_compiled
+from tactileq.modeling.estimation.likelihood import Power, bins_near
+from tactileq.modeling.fitting.blending import Middles
+from tactileq.modeling.fitting.equations import STEP_OF_CORNERS, cells
 from tests.modeling.estimation.test_compiled import drawn, slopes
 print(is_compiled(), *slopes(*drawn(11, rows=3, layers=2, bins=50)).objective)
 """

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modeling import PEQ, InputError, Layers, Spectrum, find_layers
-from modeling.estimation.paper import find_peak_frequencies, fit_layers, noise_amount
+from tactileq.modeling import PEQ, InputError, Layers, Spectrum, find_layers
+from tactileq.modeling.estimation.paper import find_peak_frequencies, fit_layers, noise_amount
 from tests.refusals import refused
 
 FREQUENCY_HZ = np.arange(2501.0)  # 1 s at 5 kHz

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modeling import PEQ, InputError
-from modeling.estimation.given_count import fit_layer_count
-from modeling.recordings.spectrum import Spectrum
+from tactileq.modeling import PEQ, InputError
+from tactileq.modeling.estimation.given_count import fit_layer_count
+from tactileq.modeling.recordings.spectrum import Spectrum
 from tests.refusals import refused
 
 FREQUENCY_HZ = np.arange(2501.0)

@@ -11,14 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import butter, sosfilt
 
-from modeling import PEQ, InputError, Layers, Recording, find_layers, spectrum
-from modeling.arrays import Floats
-from modeling.equalizer.bands import band_response
-from modeling.equalizer.signs import neighbouring_patterns, sign_patterns
-from modeling.estimation.joint import fit_jointly
-from modeling.estimation.likelihood import signal_power
-from modeling.estimation.peaks import MOST_LAYERS, PENALTY, find_peaks_jointly
-from modeling.recordings.spectrum import spectrum_of_samples, subtract_floor
+from tactileq.modeling import PEQ, InputError, Layers, Recording, find_layers, spectrum
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.bands import band_response
+from tactileq.modeling.equalizer.signs import neighbouring_patterns, sign_patterns
+from tactileq.modeling.estimation.joint import fit_jointly
+from tactileq.modeling.estimation.likelihood import signal_power
+from tactileq.modeling.estimation.peaks import MOST_LAYERS, PENALTY, find_peaks_jointly
+from tactileq.modeling.recordings.spectrum import spectrum_of_samples, subtract_floor
 from tests.refusals import refused
 
 RATE_HZ = 5000.0

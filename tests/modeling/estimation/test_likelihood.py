@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import butter, sosfilt
 
-from modeling import PEQ
-from modeling.arrays import Floats
-from modeling.estimation.likelihood import (
+from tactileq.modeling import PEQ
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.estimation.likelihood import (
     Bins,
     Power,
     bins_near,
@@ -25,8 +25,8 @@ from modeling.estimation.likelihood import (
     power_sum_of_peaks,
     signal_power,
 )
-from modeling.estimation.peaks import find_peaks_jointly
-from modeling.recordings.spectrum import (
+from tactileq.modeling.estimation.peaks import find_peaks_jointly
+from tactileq.modeling.recordings.spectrum import (
     Spectrum,
     mean_spectrum,
     spectrum_of_samples,

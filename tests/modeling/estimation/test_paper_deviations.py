@@ -7,19 +7,19 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from modeling import ESTIMATORS, PEQ, Layers, Spectrum, TextureModel, Threshold, simplify
-from modeling.arrays import Floats
-from modeling.equalizer.bands import band_rms
-from modeling.estimation.coherent import climb, limits_of, observe
-from modeling.estimation.estimators import find_layers
-from modeling.estimation.joint import as_layers
-from modeling.estimation.layers import EstimatorName
-from modeling.estimation.likelihood import signal_power
-from modeling.estimation.paper import fit_layers
-from modeling.estimation.paper_deviations import smoothed_level_sd_db
-from modeling.perception.amplitudes import layer_amplitudes_g
-from modeling.perception.dropping import flip_probabilities
-from modeling.recordings.spectrum import spectrum_of_samples
+from tactileq.modeling import ESTIMATORS, PEQ, Layers, Spectrum, TextureModel, Threshold, simplify
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.bands import band_rms
+from tactileq.modeling.estimation.coherent import climb, limits_of, observe
+from tactileq.modeling.estimation.estimators import find_layers
+from tactileq.modeling.estimation.joint import as_layers
+from tactileq.modeling.estimation.layers import EstimatorName
+from tactileq.modeling.estimation.likelihood import signal_power
+from tactileq.modeling.estimation.paper import fit_layers
+from tactileq.modeling.estimation.paper_deviations import smoothed_level_sd_db
+from tactileq.modeling.perception.amplitudes import layer_amplitudes_g
+from tactileq.modeling.perception.dropping import flip_probabilities
+from tactileq.modeling.recordings.spectrum import spectrum_of_samples
 
 ModelMaker = Callable[..., TextureModel]
 RATE_HZ = 5000.0

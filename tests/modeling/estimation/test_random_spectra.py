@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.textures.recovery import match_layers
-from modeling import PEQ, Layers, Recording, find_layers, similarity, spectrum
-from modeling.seeds import generator
-from stimuli.planted.spectra import KINDS, RATE_HZ, RandomTruth, TruthKind, random_truth
+from tactileq.analysis.textures.recovery import match_layers
+from tactileq.modeling import PEQ, Layers, Recording, find_layers, similarity, spectrum
+from tactileq.modeling.seeds import generator
+from tactileq.stimuli.planted.spectra import KINDS, RATE_HZ, RandomTruth, TruthKind, random_truth
 
 pytestmark = pytest.mark.long("a sweep of 201 random spectra")
 PER_KIND = 67

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from modeling.files.answer_tables import (
+from tactileq.modeling.files.answer_tables import (
     ANSWER_TABLES,
     CORRECT,
     RESPONSE_TIME,

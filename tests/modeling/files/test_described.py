@@ -12,12 +12,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modeling import InputError
-from modeling.errors import shown
-from modeling.files.described import BESIDE, DescribedFile, FileSection, key, keys_of
-from modeling.files.describing import key_tables, schema
-from modeling.files.kinds import Name, TextureNames
-from modeling.files.values import NameOrFile
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.described import BESIDE, DescribedFile, FileSection, key, keys_of
+from tactileq.modeling.files.describing import key_tables, schema
+from tactileq.modeling.files.kinds import Name, TextureNames
+from tactileq.modeling.files.values import NameOrFile
 from tests.refusals import refused
 
 

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modeling import InputError
-from modeling.files.columns import Column
-from modeling.files.documents import read_json_object
-from modeling.files.folders import check_replaceable, listed_file, replace_folder
-from modeling.files.tables import read_table, write_table
-from modeling.files.writing import file_stem, write_text
+from tactileq.modeling import InputError
+from tactileq.modeling.files.columns import Column
+from tactileq.modeling.files.documents import read_json_object
+from tactileq.modeling.files.folders import check_replaceable, listed_file, replace_folder
+from tactileq.modeling.files.tables import read_table, write_table
+from tactileq.modeling.files.writing import file_stem, write_text
 from tests.refusals import refused, warned
 
 

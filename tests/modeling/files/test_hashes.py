@@ -8,8 +8,8 @@ import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
-from modeling.files.hashes import sha256_of_paths
-from modeling.files.places import locked, unfinished_folder
+from tactileq.modeling.files.hashes import sha256_of_paths
+from tactileq.modeling.files.places import locked, unfinished_folder
 
 
 def folder_of(place: Path, files: Mapping[str, bytes]) -> str:

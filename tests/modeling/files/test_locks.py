@@ -15,11 +15,11 @@ from pathlib import Path
 
 import pytest
 
-from modeling import InputError
-from modeling.files import places
-from modeling.files.locks import HeldError, Lock, is_held
-from modeling.files.places import LOCK_NAME, clear_unfinished, locked
-from modeling.files.writing import write_files, write_text
+from tactileq.modeling import InputError
+from tactileq.modeling.files import places
+from tactileq.modeling.files.locks import HeldError, Lock, is_held
+from tactileq.modeling.files.places import LOCK_NAME, clear_unfinished, locked
+from tactileq.modeling.files.writing import write_files, write_text
 from tests.refusals import refused
 
 fork = multiprocessing.get_context("fork")

@@ -15,10 +15,10 @@ from typing import Any
 
 import pytest
 
-from modeling.files import places
-from modeling.files.folders import check_replaceable, replace_folder
-from modeling.files.places import clear_unfinished, locked, unfinished_file, unfinished_folder
-from modeling.files.writing import write_bytes, write_files, write_text
+from tactileq.modeling.files import places
+from tactileq.modeling.files.folders import check_replaceable, replace_folder
+from tactileq.modeling.files.places import clear_unfinished, locked, unfinished_file, unfinished_folder
+from tactileq.modeling.files.writing import write_bytes, write_files, write_text
 
 fork = multiprocessing.get_context("fork")
 FileSizeLimit = Callable[[int], AbstractContextManager[None]]

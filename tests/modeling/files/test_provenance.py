@@ -6,7 +6,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 import pytest
 
-from modeling.files.provenance import NOT_INSTALLED, provenance_of
+from tactileq.modeling.files.provenance import NOT_INSTALLED, provenance_of
 
 
 def test_what_is_not_installed_is_stated(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -15,7 +15,7 @@ def test_what_is_not_installed_is_stated(monkeypatch: pytest.MonkeyPatch) -> Non
             raise PackageNotFoundError(name)
         return version(name)
 
-    monkeypatch.setattr("modeling.files.provenance.version", without_psychopy)
+    monkeypatch.setattr("tactileq.modeling.files.provenance.version", without_psychopy)
     versions = provenance_of("model", {})["versions"]
     assert versions["psychopy"] == NOT_INSTALLED
     assert versions["numpy"] == version("numpy")

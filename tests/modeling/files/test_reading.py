@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modeling import InputError
-from modeling.errors import shortened, shown
-from modeling.files.columns import Column
-from modeling.files.documents import read_json_object, read_toml
-from modeling.files.reading import check_file, read_bytes, read_text, reason_of
-from modeling.files.tables import csv_cells, read_table
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shortened, shown
+from tactileq.modeling.files.columns import Column
+from tactileq.modeling.files.documents import read_json_object, read_toml
+from tactileq.modeling.files.reading import check_file, read_bytes, read_text, reason_of
+from tactileq.modeling.files.tables import csv_cells, read_table
 from tests.refusals import refused
 
 

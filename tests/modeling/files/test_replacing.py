@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from modeling import InputError
-from modeling.files import folders, places
-from modeling.files.folders import contents_of, folder_behind, replace_folder
-from modeling.files.locks import Lock, is_held
-from modeling.files.places import LOCK_NAME, locked
-from modeling.files.writing import write_files
+from tactileq.modeling import InputError
+from tactileq.modeling.files import folders, places
+from tactileq.modeling.files.folders import contents_of, folder_behind, replace_folder
+from tactileq.modeling.files.locks import Lock, is_held
+from tactileq.modeling.files.places import LOCK_NAME, locked
+from tactileq.modeling.files.writing import write_files
 from tests.power_cut import Files, laid_out, watched
 from tests.refusals import refused
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from modeling import InputError
+from tactileq.modeling import InputError
 from tests.refusals import refused
 from tests.saved_files import READERS, SAVED, reader
 

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.columns import tsv_text
-from experiments.sessions.bids_tables import cell as bids_cell
-from experiments.sessions.tables import cell as session_cell
-from modeling.files.columns import Column
-from modeling.files.tables import guarded, read_table, table_text, unguarded, write_table
+from tactileq.analysis.columns import tsv_text
+from tactileq.experiments.sessions.bids_tables import cell as bids_cell
+from tactileq.experiments.sessions.tables import cell as session_cell
+from tactileq.modeling.files.columns import Column
+from tactileq.modeling.files.tables import guarded, read_table, table_text, unguarded, write_table
 
 FORMULAS = ["=1+1", "+1", "@SUM(A1)", "'=1", "''@x", '=HYPERLINK("a")']
 PLAIN = ["oak", "'oak'", "'", "-1", "1=1", "", "wall paper", "a@b", "−1"]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import soundfile
 
-from modeling import InputError, RecordingSet
-from modeling.files.wav import read_wav
+from tactileq.modeling import InputError, RecordingSet
+from tactileq.modeling.files.wav import read_wav
 from tests.refusals import refused
 
 NOISE = np.random.default_rng(1).standard_normal(100)

@@ -13,14 +13,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import freqz, lfilter, welch
 
-from modeling import ARFilter, ARModel, GridError, InputError, Recording, fit_ar
-from modeling.fitting.autoregressive import fit_filter
-from modeling.models.line_spectral import (
+from tactileq.modeling import ARFilter, ARModel, GridError, InputError, Recording, fit_ar
+from tactileq.modeling.fitting.autoregressive import fit_filter
+from tactileq.modeling.models.line_spectral import (
     line_spectral_frequencies,
     prediction_coefficients,
     reflection_coefficients,
 )
-from modeling.recordings.spectrum import spectrum_of_samples
+from tactileq.modeling.recordings.spectrum import spectrum_of_samples
 from tests.refusals import refused
 
 RATE_HZ = 5000.0

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modeling.arrays import Floats
-from modeling.estimation.coherent import Observed
-from modeling.fitting.blending import Middles
-from modeling.fitting.equations import cells
-from modeling.fitting.joint_grid import LARGEST_DEFECT_DB
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.estimation.coherent import Observed
+from tactileq.modeling.fitting.blending import Middles
+from tactileq.modeling.fitting.equations import cells
+from tactileq.modeling.fitting.joint_grid import LARGEST_DEFECT_DB
 
 RATE_HZ = 1000.0
 

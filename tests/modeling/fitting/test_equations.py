@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modeling.arrays import Floats
-from modeling.fitting.equations import (
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.fitting.equations import (
     STEPS,
     Blocks,
     Corners,

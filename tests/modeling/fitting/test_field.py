@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modeling.arrays import Floats
-from modeling.estimation.coherent import limits_of, observe, response
-from modeling.estimation.likelihood import Power, signal_power
-from modeling.fitting.equations import Blocks, Corners
-from modeling.fitting.field import (
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.estimation.coherent import limits_of, observe, response
+from tactileq.modeling.estimation.likelihood import Power, signal_power
+from tactileq.modeling.fitting.equations import Blocks, Corners
+from tactileq.modeling.fitting.field import (
     FAINTEST,
     TREND_SHARE,
     Field,
@@ -24,7 +24,7 @@ from modeling.fitting.field import (
     solve,
     updated_precision,
 )
-from modeling.recordings.spectrum import spectrum_of_samples
+from tactileq.modeling.recordings.spectrum import spectrum_of_samples
 
 SHAPES = [(1, 1), (1, 5), (5, 1), (2, 2), (3, 4), (4, 3)]
 RATE_HZ = 5000.0
@@ -153,7 +153,7 @@ def textured(
             frequency = np.arange(1.0, 2501.0)
             tangent = np.tan(np.pi * np.minimum(frequency, 2499.0) / RATE_HZ)[None]
             one = np.ones(tangent.shape)
-            from modeling.estimation.coherent import Observed
+            from tactileq.modeling.estimation.coherent import Observed
 
             lines = Observed(one, one, one, tangent, 1 / tangent, np.zeros(1), RATE_HZ)
             shape = np.sqrt(response(theta[None], np.ones(1), lines).power[0])
@@ -219,7 +219,7 @@ def test_no_condition_stays_worse_than_its_neighbours_foretell() -> None:
     limits = limits_of(1, rate_hz=RATE_HZ, step_hz=1.0)
     fit = fit_field(start, np.ones(1), observed, field_of(4, 3, 1), limits=limits, steps=30)
     assert np.exp(fit.theta[7, 1]) == pytest.approx(300.0, abs=15)
-    from modeling.estimation.coherent import slopes
+    from tactileq.modeling.estimation.coherent import slopes
 
     predicted = slopes(fit.field.predicted(fit.theta), np.ones(1), observed)
     assert (fit.slopes.objective <= predicted.objective + 0.3).all()
@@ -268,8 +268,8 @@ def test_evidence_prefers_the_layer_that_is_there_to_one_more() -> None:
 
 def test_evidence_of_a_linear_field_is_that_of_its_normal_distribution() -> None:
     """One parameter, quadratic misfit: log ∫ N(y; θ)·prior(θ) dθ is known in closed form."""
-    from modeling.estimation.coherent import Slopes
-    from modeling.fitting.field import FieldFit
+    from tactileq.modeling.estimation.coherent import Slopes
+    from tactileq.modeling.fitting.field import FieldFit
 
     field = replace(random_field(3, 2, 1), trend=np.zeros((2, 1)))
     information = np.array([3.0, 5.0, 2.0, 4.0, 1.0, 2.5])

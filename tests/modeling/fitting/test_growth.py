@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modeling import PEQ, Recording
-from modeling.arrays import Floats
-from modeling.estimation.coherent import response
-from modeling.estimation.likelihood import split
-from modeling.fitting.growth import _along, candidates, inserted, inserted_independently
-from modeling.fitting.layer_search import fitted, in_frequency_order, search
-from modeling.fitting.texture_grid import TextureGrid, texture_grid
-from modeling.recordings.spectrum import spectrum
+from tactileq.modeling import PEQ, Recording
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.estimation.coherent import response
+from tactileq.modeling.estimation.likelihood import split
+from tactileq.modeling.fitting.growth import _along, candidates, inserted, inserted_independently
+from tactileq.modeling.fitting.layer_search import fitted, in_frequency_order, search
+from tactileq.modeling.fitting.texture_grid import TextureGrid, texture_grid
+from tactileq.modeling.recordings.spectrum import spectrum
 
 RATE_HZ = 5000.0
 SPEEDS = (60.0, 100.0, 160.0, 250.0)

@@ -9,15 +9,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from modeling import PEQ, Recording, RecordingSet
-from modeling.arrays import Floats
-from modeling.equalizer.bands import band_response
-from modeling.fitting.conditions import recording_spectra
-from modeling.fitting.joint_grid import GridFit, fit_grid_jointly
-from modeling.fitting.texture import fit_spectra
-from modeling.models.grid import Condition
-from modeling.models.own_peaks import own_peaks
-from modeling.recordings.spectrum import Spectrum, spectrum_of_samples
+from tactileq.modeling import PEQ, Recording, RecordingSet
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.bands import band_response
+from tactileq.modeling.fitting.conditions import recording_spectra
+from tactileq.modeling.fitting.joint_grid import GridFit, fit_grid_jointly
+from tactileq.modeling.fitting.texture import fit_spectra
+from tactileq.modeling.models.grid import Condition
+from tactileq.modeling.models.own_peaks import own_peaks
+from tactileq.modeling.recordings.spectrum import Spectrum, spectrum_of_samples
 
 RATE_HZ = 5000.0
 SAMPLES = 5000

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modeling.fitting.paper_naming import assign_peaks, reference_of, visiting_order
+from tactileq.modeling.fitting.paper_naming import assign_peaks, reference_of, visiting_order
 
 
 @pytest.mark.parametrize(

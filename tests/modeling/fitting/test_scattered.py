@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from modeling import GridError, RecordingSet, TextureModel, fit_texture
-from modeling.arrays import Floats
-from modeling.fitting.conditions import recording_spectra
-from modeling.fitting.joint_grid import LARGEST_DEFECT_DB
-from modeling.fitting.texture_grid import texture_grid
-from modeling.models.grid import Condition
-from stimuli.planted.drawn import FORCES_N, SPEEDS_MM_S, DrawnSurface, draw_surface
+from tactileq.modeling import GridError, RecordingSet, TextureModel, fit_texture
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.fitting.conditions import recording_spectra
+from tactileq.modeling.fitting.joint_grid import LARGEST_DEFECT_DB
+from tactileq.modeling.fitting.texture_grid import texture_grid
+from tactileq.modeling.models.grid import Condition
+from tactileq.stimuli.planted.drawn import FORCES_N, SPEEDS_MM_S, DrawnSurface, draw_surface
 
 FREQUENCY_HZ = np.arange(15.0, 481.0)
 # Surfaces by which no constant of the estimator was chosen.

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from modeling import InputError, Recording, RecordingSet, Spectrum, fit_ar
-from modeling.arrays import Floats
-from modeling.estimation.likelihood import LOWEST_FITTED_HZ
-from modeling.fitting.conditions import recording_spectra
-from modeling.fitting.spectral_field import (
+from tactileq.modeling import InputError, Recording, RecordingSet, Spectrum, fit_ar
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.estimation.likelihood import LOWEST_FITTED_HZ
+from tactileq.modeling.fitting.conditions import recording_spectra
+from tactileq.modeling.fitting.spectral_field import (
     PRIOR_CONDITIONS,
     SpectralField,
     _eigen,
@@ -22,9 +22,9 @@ from modeling.fitting.spectral_field import (
     fit_field_to_spectra,
     fit_spectral_field,
 )
-from modeling.models.grid import Condition
-from modeling.similarity import SpectralFilter
-from stimuli.planted.drawn import FORCES_N, SPEEDS_MM_S, draw_surface
+from tactileq.modeling.models.grid import Condition
+from tactileq.modeling.similarity import SpectralFilter
+from tactileq.stimuli.planted.drawn import FORCES_N, SPEEDS_MM_S, draw_surface
 from tests.refusals import refused
 
 RATE_HZ = 1000.0

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from modeling import (
+from tactileq.modeling import (
     ESTIMATORS,
     PEQ,
     InputError,
@@ -19,11 +19,11 @@ from modeling import (
     fit_texture,
     missing_conditions,
 )
-from modeling.fitting.conditions import recording_spectra, spectra_by_condition
-from modeling.fitting.texture import fit_spectra
-from modeling.models.grid import fill_grid
-from modeling.recordings.recording_set import RecordingSet
-from modeling.recordings.spectrum import mean_spectrum
+from tactileq.modeling.fitting.conditions import recording_spectra, spectra_by_condition
+from tactileq.modeling.fitting.texture import fit_spectra
+from tactileq.modeling.models.grid import fill_grid
+from tactileq.modeling.recordings.recording_set import RecordingSet
+from tactileq.modeling.recordings.spectrum import mean_spectrum
 from tests.refusals import refused
 
 ModelMaker = Callable[..., TextureModel]

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from modeling import RegressedModel, TextureModel
-from modeling.models.compiled_for import CompiledFor
+from tactileq.modeling import RegressedModel, TextureModel
+from tactileq.modeling.models.compiled_for import CompiledFor
 
 NOTE = CompiledFor("touch", "a" * 64, "b" * 64, {"gfc30": 0.95, "level_db": 1}, 4e-3, True)
 

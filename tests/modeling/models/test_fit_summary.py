@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from modeling import TextureModel
-from modeling.models.fit_summary import FitSummary
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import TextureModel
+from tactileq.modeling.models.fit_summary import FitSummary
+from tactileq.stimuli.planted.textures import planted_texture
 
 SUMMARY = FitSummary(0.5, 1.25, 0.6, {"2": 0.7, "4": 0.59}, ("a sentence", "another"))
 

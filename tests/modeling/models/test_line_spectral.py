@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modeling import InputError
-from modeling.models.line_spectral import (
+from tactileq.modeling import InputError
+from tactileq.modeling.models.line_spectral import (
     check_line_spectral,
     line_spectral_frequencies,
     prediction_coefficients,

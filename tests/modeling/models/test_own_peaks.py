@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modeling import TextureModel
-from modeling.models.own_peaks import own_peaks
+from tactileq.modeling import TextureModel
+from tactileq.modeling.models.own_peaks import own_peaks
 
 ModelMaker = Callable[..., TextureModel]
 PEAK = (280.0, 80.0, 1.0)

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modeling import InputError, RegressedModel, Renderer, TextureModel, regressed
-from modeling.models.terms import DrivenBy
+from tactileq.modeling import InputError, RegressedModel, Renderer, TextureModel, regressed
+from tactileq.modeling.models.terms import DrivenBy
 from tests.refusals import refused
 
 ModelMaker = Callable[..., TextureModel]

@@ -13,8 +13,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from modeling import InputError, TextureModel
-from modeling.models.parameter_table import LARGEST_STEP, LOWEST_GAIN_SHARE, MOST_PARTS
+from tactileq.modeling import InputError, TextureModel
+from tactileq.modeling.models.parameter_table import LARGEST_STEP, LOWEST_GAIN_SHARE, MOST_PARTS
 from tests.refusals import refused
 
 ModelMaker = Callable[..., TextureModel]

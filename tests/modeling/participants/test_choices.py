@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate, stats
 
-from modeling import InputError
-from modeling.participants.choices import (
+from tactileq.modeling import InputError
+from tactileq.modeling.participants.choices import (
     ODDITY,
     ChoicePriors,
     DecisionModel,
@@ -23,7 +23,7 @@ from modeling.participants.choices import (
     mean_effect,
     oddity_share,
 )
-from modeling.participants.effects import EffectPriors
+from tactileq.modeling.participants.effects import EffectPriors
 from tests.refusals import refused
 
 MODELS = [ODDITY, *(forced_choice(alternatives) for alternatives in (2, 3, 7, 12))]

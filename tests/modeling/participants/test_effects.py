@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
 
-from modeling.participants.effects import (
+from tactileq.modeling.participants.effects import (
     COMPONENTS,
     EffectMixture,
     EffectPriors,

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
 
-from modeling.participants.effects import EffectPriors
-from modeling.participants.ratings import (
+from tactileq.modeling.participants.effects import EffectPriors
+from tactileq.modeling.participants.ratings import (
     AT_END,
     HIGHEST,
     LOWEST,

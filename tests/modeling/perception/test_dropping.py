@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modeling import Simplification, TextureModel, Threshold, simplify
-from modeling.arrays import Floats
-from modeling.perception.dropping import MOST_GROUPS, Recorded
-from modeling.perception.power_changes import PowerChanges
-from modeling.perception.signs_of_rest import at_conditions
-from modeling.perception.simplification import distances_db
+from tactileq.modeling import Simplification, TextureModel, Threshold, simplify
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.perception.dropping import MOST_GROUPS, Recorded
+from tactileq.modeling.perception.power_changes import PowerChanges
+from tactileq.modeling.perception.signs_of_rest import at_conditions
+from tactileq.modeling.perception.simplification import distances_db
 
 ModelMaker = Callable[..., TextureModel]
 EVERYWHERE = np.array([1e-6, 1e6])

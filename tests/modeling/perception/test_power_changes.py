@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modeling import TextureModel, Threshold
-from modeling.arrays import Floats
-from modeling.equalizer.bands import band_response
-from modeling.models.parameter_table import Parameters
-from modeling.perception.power_changes import PowerChange, PowerChanges
+from tactileq.modeling import TextureModel, Threshold
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.bands import band_response
+from tactileq.modeling.models.parameter_table import Parameters
+from tactileq.modeling.perception.power_changes import PowerChange, PowerChanges
 
 ModelMaker = Callable[..., TextureModel]
 RATE_HZ = 5000.0

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modeling import InputError, Threshold
-from modeling.perception.sensation_level import sensation_level
+from tactileq.modeling import InputError, Threshold
+from tactileq.modeling.perception.sensation_level import sensation_level
 from tests.refusals import refused
 
 FLAT = Threshold("flat", [10.0, 400.0], [0.01, 0.01], "planted", "none")

@@ -13,10 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import ndtr
 
-from modeling import CRITERIA, InputError, Simplification, TextureModel, Threshold, simplify
-from modeling.perception.amplitudes import layer_amplitudes_g
-from modeling.perception.signs_of_rest import with_signs_chosen_again
-from modeling.perception.simplification import distances_db
+from tactileq.modeling import CRITERIA, InputError, Simplification, TextureModel, Threshold, simplify
+from tactileq.modeling.perception.amplitudes import layer_amplitudes_g
+from tactileq.modeling.perception.signs_of_rest import with_signs_chosen_again
+from tactileq.modeling.perception.simplification import distances_db
 from tests.refusals import refused
 
 ModelMaker = Callable[..., TextureModel]

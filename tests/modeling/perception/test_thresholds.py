@@ -9,8 +9,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from modeling import InputError, Threshold
-from modeling.perception.thresholds import LEVELS_G, SHIPPED, displacement_to_acceleration_g
+from tactileq.modeling import InputError, Threshold
+from tactileq.modeling.perception.thresholds import LEVELS_G, SHIPPED, displacement_to_acceleration_g
 from tests.refusals import refused
 
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modeling import InputError, Simplification, TextureModel, Threshold, simplify
-from modeling.models.loading import models_in
-from modeling.perception.verdicts import ENDING, load_simplifications
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import InputError, Simplification, TextureModel, Threshold, simplify
+from tactileq.modeling.models.loading import models_in
+from tactileq.modeling.perception.verdicts import ENDING, load_simplifications
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 
 ModelMaker = Callable[..., TextureModel]

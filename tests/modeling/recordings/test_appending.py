@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 import soundfile
 
-from modeling import InputError, Recording, RecordingSet
-from modeling.files.wav import read_wav
-from modeling.recordings.appending import UNFINISHED_NAME, WavSource, append
-from modeling.recordings.recording_set import INDEX_NAME
+from tactileq.modeling import InputError, Recording, RecordingSet
+from tactileq.modeling.files.wav import read_wav
+from tactileq.modeling.recordings.appending import UNFINISHED_NAME, WavSource, append
+from tactileq.modeling.recordings.recording_set import INDEX_NAME
 from tests.refusals import refused
 
 NOISE = np.random.default_rng(1).uniform(-0.9, 0.9, (500, 3))
@@ -146,8 +146,8 @@ def test_a_full_disk_changes_nothing(
 KILLED = """
 import os, shutil, signal, sys
 from pathlib import Path
-from modeling import RecordingSet
-from modeling.recordings import appending, recording_set
+from tactileq.modeling import RecordingSet
+from tactileq.modeling.recordings import appending, recording_set
 die = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
 step, folder, other = sys.argv[1:]
 def half(source, target):

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy.signal import butter, sosfilt
 
-from modeling import InputError, Recording, RecordingSet
-from modeling.errors import shown
-from modeling.recordings.recording_set import is_recording_set, load_usable, textures_in
+from tactileq.modeling import InputError, Recording, RecordingSet
+from tactileq.modeling.errors import shown
+from tactileq.modeling.recordings.recording_set import is_recording_set, load_usable, textures_in
 from tests.refusals import check_refusal, refused
 
 RecordingMaker = Callable[..., Recording]
@@ -442,7 +442,7 @@ def snapshot(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize(
-    "broken", ["modeling.recordings.recording_set.write_samples", "pathlib.Path.rename"]
+    "broken", ["tactileq.modeling.recordings.recording_set.write_samples", "pathlib.Path.rename"]
 )
 def test_failed_save_leaves_the_old_folder(
     folder: Path,

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modeling.recordings.sinusoids import (
+from tactileq.modeling.recordings.sinusoids import (
     common_hum,
     find_sinusoids,
     mains_harmonics,

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modeling import InputError, Recording, Spectrum, spectrum
-from modeling.recordings.spectrum import (
+from tactileq.modeling import InputError, Recording, Spectrum, spectrum
+from tactileq.modeling.recordings.spectrum import (
     high_pass_response,
     mean_spectrum,
     prepare,

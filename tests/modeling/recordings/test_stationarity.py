@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modeling import PEQ
-from modeling.recordings.stationarity import drift_of, without_drift
+from tactileq.modeling import PEQ
+from tactileq.modeling.recordings.stationarity import drift_of, without_drift
 
 RATE_HZ = 5000.0
 FINE = 8

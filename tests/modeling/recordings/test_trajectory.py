@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modeling import InputError
-from modeling.recordings.trajectory import Trajectory, load_trajectory
+from tactileq.modeling import InputError
+from tactileq.modeling.recordings.trajectory import Trajectory, load_trajectory
 from tests.refusals import refused
 
 HEADER = "time_s,speed_mm_s,force_n\n"

@@ -11,21 +11,21 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from modeling import InputError, TextureModel
-from modeling.models.terms import FORCE, SPEED, SPEED_FORCE, TERMS
-from modeling.regression.centroid import (
+from tactileq.modeling import InputError, TextureModel
+from tactileq.modeling.models.terms import FORCE, SPEED, SPEED_FORCE, TERMS
+from tactileq.modeling.regression.centroid import (
     centroid_correlations,
     centroid_observations,
     centroid_regression,
     spectral_centroid_hz,
 )
-from modeling.regression.least_squares import (
+from tactileq.modeling.regression.least_squares import (
     ALPHA,
     condition_predictors,
     reduced_regression,
     regress,
 )
-from modeling.regression.parameters import parameter_observations, parameter_regressions
+from tactileq.modeling.regression.parameters import parameter_observations, parameter_regressions
 from tests.refusals import refused
 
 ModelMaker = Callable[..., TextureModel]

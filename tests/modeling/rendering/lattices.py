@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling import Renderer
-from modeling.arrays import Floats
-from modeling.models.ar_model import ARModel
-from modeling.models.line_spectral import line_spectral_frequencies
-from modeling.rendering.compiled import filled, render_counters
-from modeling.rendering.lattice import lattice_fields
-from modeling.rendering.noise import stream_key
-from modeling.rendering.plan import RenderCounters, plan_for
-from rig.live.compiled import compiled
+from tactileq.modeling import Renderer
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.models.ar_model import ARModel
+from tactileq.modeling.models.line_spectral import line_spectral_frequencies
+from tactileq.modeling.rendering.compiled import filled, render_counters
+from tactileq.modeling.rendering.lattice import lattice_fields
+from tactileq.modeling.rendering.noise import stream_key
+from tactileq.modeling.rendering.plan import RenderCounters, plan_for
+from tactileq.rig.live.compiled import compiled
 
 
 def ar_model(

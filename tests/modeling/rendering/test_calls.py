@@ -14,11 +14,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from modeling import ARModel, InputError, Limits, Renderer
-from modeling.engines import SWITCH
-from modeling.errors import shown
-from modeling.rendering.compiled import Call
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import ARModel, InputError, Limits, Renderer
+from tactileq.modeling.engines import SWITCH
+from tactileq.modeling.errors import shown
+from tactileq.modeling.rendering.compiled import Call
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 
 CANVAS = planted_texture("canvas")

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-import modeling.rendering
-from benches.rendering.rivals import layered_texture
-from modeling import Limits, compensation_for
-from modeling.rendering.plan import RenderPlan, plan_for
-from stimuli.planted.vibrators import planted_vibrator
+import tactileq.modeling.rendering
+from tactileq.benches.rendering.rivals import layered_texture
+from tactileq.modeling import Limits, compensation_for
+from tactileq.modeling.rendering.plan import RenderPlan, plan_for
+from tactileq.stimuli.planted.vibrators import planted_vibrator
 
 HERE = Path(__file__).parent
-KERNEL_FOLDER = Path(modeling.rendering.__file__).parent
+KERNEL_FOLDER = Path(tactileq.modeling.rendering.__file__).parent
 pytestmark = pytest.mark.skipif(
     shutil.which("g++") is None, reason="g++ is not installed (see tools/system-packages)"
 )

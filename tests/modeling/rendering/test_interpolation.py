@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.signal import group_delay, upfirdn
 
-import modeling.rendering.compiled
-from modeling import InputError, Renderer
-from modeling.rendering.interpolation import DOUBLING, PHASE, Interpolation, interpolation
-from stimuli.planted.textures import planted_texture
+import tactileq.modeling.rendering.compiled
+from tactileq.modeling import InputError, Renderer
+from tactileq.modeling.rendering.interpolation import DOUBLING, PHASE, Interpolation, interpolation
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 
 RATES_HZ = [
@@ -66,7 +66,7 @@ def test_a_held_hand_gives_upfirdn_of_the_models_own_signal(rates_hz: tuple[floa
 
 
 def test_lengths_are_those_of_the_kernel() -> None:
-    lib = modeling.rendering.compiled._kernel.lib
+    lib = tactileq.modeling.rendering.compiled._kernel.lib
     assert lib.TQ_KEPT + lib.TQ_KEPT_DOUBLED == DOUBLING - 1 + PHASE + 1 + 3 * 64
 
 

@@ -13,15 +13,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-import modeling.rendering.compiled
-from modeling import Limits, Renderer, TextureModel, regressed
-from modeling.engines import SWITCH
-from modeling.equalizer.bands import band_coefficients
-from modeling.rendering.noise import stream_key, white_noise
-from stimuli.planted.textures import CATALOGUE, planted_texture
+import tactileq.modeling.rendering.compiled
+from tactileq.modeling import Limits, Renderer, TextureModel, regressed
+from tactileq.modeling.engines import SWITCH
+from tactileq.modeling.equalizer.bands import band_coefficients
+from tactileq.modeling.rendering.noise import stream_key, white_noise
+from tactileq.stimuli.planted.textures import CATALOGUE, planted_texture
 
 pytestmark = pytest.mark.skipif(
-    modeling.rendering.compiled.Call is None, reason="no kernel was compiled"
+    tactileq.modeling.rendering.compiled.Call is None, reason="no kernel was compiled"
 )
 
 
@@ -148,7 +148,7 @@ def test_bits_are_equal_with_compensation_and_limits() -> None:
 def test_coefficients_are_equal(frequency_hz: float, bandwidth_hz: float) -> None:
     python = band_coefficients(frequency_hz, bandwidth_hz, rate_hz=5000.0)
     angle = np.pi / 5000.0
-    band = modeling.rendering.compiled._kernel.lib.tq_band_of(
+    band = tactileq.modeling.rendering.compiled._kernel.lib.tq_band_of(
         angle * frequency_hz, angle * bandwidth_hz
     )
     assert [float(value) for value in python] == [getattr(band, name) for name in python._fields]
@@ -186,11 +186,11 @@ def test_without_a_kernel_it_says_so_once_and_renders_the_same() -> None:
     """A fresh process in which the extension cannot be imported."""
     program = """
 import sys, warnings
-sys.modules["modeling.rendering._kernel"] = None
+sys.modules["tactileq.modeling.rendering._kernel"] = None
 with warnings.catch_warnings(record=True) as told:
     warnings.simplefilter("default")
-    from modeling import Renderer
-    from stimuli.planted.textures import planted_texture
+    from tactileq.modeling import Renderer
+    from tactileq.stimuli.planted.textures import planted_texture
     Renderer(planted_texture("MDF"))
     Renderer(planted_texture("PVC"))
     signal = Renderer(planted_texture("canvas")).render(100.0, 1.0, samples=400)

@@ -20,15 +20,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benches.rendering.rivals import layered_texture
-from modeling import Limits, Renderer, TextureModel
-from modeling.engines import SWITCH
-from modeling.rendering.noise import stream_key
-from modeling.rendering.plan import RenderPlan, plan_for
-from modeling.scenes.microcontrollers import MicroController
-from stimuli.exports.c_header import write_c_header
-from stimuli.exports.scene_header import scene_header
-from stimuli.planted.textures import planted_texture
+from tactileq.benches.rendering.rivals import layered_texture
+from tactileq.modeling import Limits, Renderer, TextureModel
+from tactileq.modeling.engines import SWITCH
+from tactileq.modeling.rendering.noise import stream_key
+from tactileq.modeling.rendering.plan import RenderPlan, plan_for
+from tactileq.modeling.scenes.microcontrollers import MicroController
+from tactileq.stimuli.exports.c_header import write_c_header
+from tactileq.stimuli.exports.scene_header import scene_header
+from tactileq.stimuli.planted.textures import planted_texture
 
 HERE = Path(__file__).parent
 DOCS = HERE.parents[2] / "docs"

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.optimize import elementwise
 
-from modeling import Limits, Renderer, TextureModel
-from modeling.arrays import Floats
-from modeling.rendering.compiled import _kernel, is_compiled
-from modeling.rendering.noise import stream_key, white_noise
-from modeling.rendering.plan import FADE_S, HOLD_S, RELEASE_S, plan_for
+from tactileq.modeling import Limits, Renderer, TextureModel
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.rendering.compiled import _kernel, is_compiled
+from tactileq.modeling.rendering.noise import stream_key, white_noise
+from tactileq.modeling.rendering.plan import FADE_S, HOLD_S, RELEASE_S, plan_for
 
 MODEL_RATE_HZ = 5000.0
 RATES_HZ = (5000.0, 48000.0)

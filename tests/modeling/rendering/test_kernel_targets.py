@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import modeling.rendering
-from modeling import Limits, compensation_for
-from stimuli.exports.c_header import write_c_header
-from stimuli.planted.textures import planted_texture
-from stimuli.planted.vibrators import planted_vibrator
+import tactileq.modeling.rendering
+from tactileq.modeling import Limits, compensation_for
+from tactileq.stimuli.exports.c_header import write_c_header
+from tactileq.stimuli.planted.textures import planted_texture
+from tactileq.stimuli.planted.vibrators import planted_vibrator
 
 HERE = Path(__file__).parent
-KERNEL_FOLDER = Path(modeling.rendering.__file__).parent
+KERNEL_FOLDER = Path(tactileq.modeling.rendering.__file__).parent
 STRICT = ["-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Werror", "-ffp-contract=off"]
 FREESTANDING = ["-DTQ_FREESTANDING", "-ffreestanding"]
 

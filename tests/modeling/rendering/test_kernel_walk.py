@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import modeling.rendering
+import tactileq.modeling.rendering
 
 pytestmark = pytest.mark.long("sweeps of signals: a million steps")
 
 HERE = Path(__file__).parent
-KERNEL_FOLDER = Path(modeling.rendering.__file__).parent
+KERNEL_FOLDER = Path(tactileq.modeling.rendering.__file__).parent
 SAMPLES = 10_000_000
 PRECISIONS = ("double", "float")
 # Each coefficient is right to a few units in the last place of numbers up to 2, and counts twice in

@@ -13,16 +13,16 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.signal import lfilter, welch
 
-import modeling.rendering
-from modeling import InputError, Limits, Recording, Renderer
-from modeling.arrays import Floats
-from modeling.fitting.autoregressive import HIGHEST_ORDER, fit_ar
-from modeling.models.ar_model import ARModel
-from modeling.rendering.lattice import lattice_fields
-from modeling.rendering.plan import plan_for
-from modeling.rendering.reference.compensator import Compensator
-from modeling.vibrators.compensation import Compensation
-from stimuli.planted.textures import planted_texture
+import tactileq.modeling.rendering
+from tactileq.modeling import InputError, Limits, Recording, Renderer
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.fitting.autoregressive import HIGHEST_ORDER, fit_ar
+from tactileq.modeling.models.ar_model import ARModel
+from tactileq.modeling.rendering.lattice import lattice_fields
+from tactileq.modeling.rendering.plan import plan_for
+from tactileq.modeling.rendering.reference.compensator import Compensator
+from tactileq.modeling.vibrators.compensation import Compensation
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.modeling.rendering.lattices import (
     CompiledLattice,
     ar_model,
@@ -143,7 +143,7 @@ def test_blocks_of_any_size_have_equal_bits(block: int) -> None:
 
 
 def test_memory_of_just_its_size_is_enough(tmp_path: Path) -> None:
-    headers = Path(modeling.rendering.__file__).parent
+    headers = Path(tactileq.modeling.rendering.__file__).parent
     options = ["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wno-unused-function"]
     watched = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
     target = tmp_path / "memory"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modeling import Limits
-from modeling.rendering.plan import plan_for
-from modeling.rendering.reference.limiter import Limiter
+from tactileq.modeling import Limits
+from tactileq.modeling.rendering.plan import plan_for
+from tactileq.modeling.rendering.reference.limiter import Limiter
 
 
 @pytest.mark.parametrize("seconds", [0.02, 1.0])

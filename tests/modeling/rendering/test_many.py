@@ -13,19 +13,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-import modeling.rendering.many
-from modeling import ARModel, InputError, Limits, Renderer, TextureModel, regressed, render_many
-from modeling.arrays import Floats
-from modeling.engines import SWITCH
-from modeling.hand import Hand
-from modeling.models.compiled_for import CompiledFor
-from modeling.rendering.many import WIDTHS, lib, rendered
-from modeling.vibrators.compensation import Compensation
-from stimuli.planted.textures import TEXTURES, planted_texture
+import tactileq.modeling.rendering.many
+from tactileq.modeling import ARModel, InputError, Limits, Renderer, TextureModel, regressed, render_many
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.engines import SWITCH
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.models.compiled_for import CompiledFor
+from tactileq.modeling.rendering.many import WIDTHS, lib, rendered
+from tactileq.modeling.vibrators.compensation import Compensation
+from tactileq.stimuli.planted.textures import TEXTURES, planted_texture
 from tests.refusals import refused
 
 HERE = Path(__file__).parent
-KERNEL_FOLDER = Path(modeling.rendering.many.__file__).parent
+KERNEL_FOLDER = Path(tactileq.modeling.rendering.many.__file__).parent
 RATES_HZ = (5000.0, 48000.0)
 LIMITS = Limits(peak=0.9, rms=0.4, rms_window_s=0.05, duration_s=0.02, pause_s=0.004)
 ANY_VALUE = (
@@ -210,7 +210,7 @@ def test_lists_integers_and_views_are_hands() -> None:
 
 @pytest.mark.parametrize("cores", [1, 2])
 def test_number_of_cores_does_not_matter(cores: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(modeling.rendering.many, "usable_cores", lambda: cores)
+    monkeypatch.setattr(tactileq.modeling.rendering.many, "usable_cores", lambda: cores)
     models, hands = [wild_model(3)] * 40, strokes([300] * 40)
     found = render_many(models, hands, seeds=range(40))
     for seed in (0, 17, 39):
@@ -226,7 +226,7 @@ def test_without_compiled_parts_the_bits_stay(
     if without == "kernel":
         monkeypatch.setenv(SWITCH, "1")
     else:
-        monkeypatch.setattr(modeling.rendering.many, "lib", None)
+        monkeypatch.setattr(tactileq.modeling.rendering.many, "lib", None)
     found = render_many(models, hands, seeds=[1, 2], limits=LIMITS)
     assert [signal.tobytes() for signal in found] == [signal.tobytes() for signal in expected]
 

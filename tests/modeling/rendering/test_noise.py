@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modeling.rendering.noise import stream_key, white_noise
+from tactileq.modeling.rendering.noise import stream_key, white_noise
 
 WORD = 2**64
 SQRT_3 = 3**0.5

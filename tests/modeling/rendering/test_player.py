@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-import modeling.rendering
+import tactileq.modeling.rendering
 
 HERE = Path(__file__).parent
-HEADERS = Path(modeling.rendering.__file__).parent
+HEADERS = Path(tactileq.modeling.rendering.__file__).parent
 WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Werror"]
 LANGUAGES = {
     "C11": ["gcc", "-std=c11"],

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modeling import InputError, Renderer
-from modeling.arrays import Floats
-from modeling.engines import SWITCH
-from modeling.rendering.compiled import Call
-from modeling.rendering.many import render_many
-from modeling.rendering.plan import HOLD_S, RELEASE_S
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import InputError, Renderer
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.engines import SWITCH
+from tactileq.modeling.rendering.compiled import Call
+from tactileq.modeling.rendering.many import render_many
+from tactileq.modeling.rendering.plan import HOLD_S, RELEASE_S
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 
 RATE_HZ = 5000

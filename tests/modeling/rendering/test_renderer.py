@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter, welch
 
-from modeling import (
+from tactileq.modeling import (
     ARModel,
     Compensation,
     InputError,
@@ -20,14 +20,14 @@ from modeling import (
     Renderer,
     TextureModel,
 )
-from modeling.engines import SWITCH
-from modeling.errors import shown
-from modeling.hand import Hand
-from modeling.models.compiled_for import CompiledFor
-from modeling.models.line_spectral import line_spectral_frequencies
-from modeling.rendering.compiled import Call, is_compiled
-from modeling.rendering.reference.hand import Extrapolator
-from modeling.rendering.reference.lattice import LatticeFilter
+from tactileq.modeling.engines import SWITCH
+from tactileq.modeling.errors import shown
+from tactileq.modeling.hand import Hand
+from tactileq.modeling.models.compiled_for import CompiledFor
+from tactileq.modeling.models.line_spectral import line_spectral_frequencies
+from tactileq.modeling.rendering.compiled import Call, is_compiled
+from tactileq.modeling.rendering.reference.hand import Extrapolator
+from tactileq.modeling.rendering.reference.lattice import LatticeFilter
 from tests.refusals import refused
 
 
@@ -145,7 +145,7 @@ def test_seed_and_stream_choose_the_noise() -> None:
 
 def test_rendering_follows_the_written_recursion() -> None:
     """docs/method/equalizer.md#recursion step by step with numpy's tangent, constant parameters."""
-    from modeling.rendering.noise import stream_key, white_noise
+    from tactileq.modeling.rendering.noise import stream_key, white_noise
 
     model, count = moving_model(), 600
     w = white_noise(stream_key(8), 0, count)
@@ -296,7 +296,7 @@ def test_parameters_are_read_once_a_millisecond(rate_hz: float, period: int) -> 
 
 
 def test_no_layers_renders_the_noise_alone(make_model: ModelMaker) -> None:
-    from modeling.rendering.noise import stream_key, white_noise
+    from tactileq.modeling.rendering.noise import stream_key, white_noise
 
     signal = Renderer(make_model(0.3, []), seed=4).render(200.0, 2.0, samples=100)
     assert signal == pytest.approx(0.3 * white_noise(stream_key(4), 0, 100), rel=1e-14)
@@ -537,7 +537,7 @@ def test_ar_blocks_of_any_size_are_bit_identical(order: int, size: int) -> None:
 @pytest.mark.parametrize("order", [1, 2, 7, 20])
 def test_ar_rendering_is_the_recursion_of_its_filter(order: int) -> None:
     """scipy's direct form on the same noise, constant parameters."""
-    from modeling.rendering.noise import stream_key, white_noise
+    from tactileq.modeling.rendering.noise import stream_key, white_noise
 
     fitted = ar_model(order).filter(150.0, 2.0)
     noise = white_noise(stream_key(8, 3), 0, 2000)
@@ -556,7 +556,7 @@ def test_ar_parameters_are_foreseen_as_those_of_layers_are() -> None:
 
 
 def test_models_of_both_kinds_are_driven_by_the_same_noise() -> None:
-    from modeling.rendering.noise import stream_key, white_noise
+    from tactileq.modeling.rendering.noise import stream_key, white_noise
 
     flat = np.pi * np.arange(1, 4) / 4  # a₁ = a₂ = a₃ = 0
     model = replace(

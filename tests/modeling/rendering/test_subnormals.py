@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modeling import Compensation, Limits, Renderer
-from modeling.rendering.compiled import Call
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import Compensation, Limits, Renderer
+from tactileq.modeling.rendering.compiled import Call
+from tactileq.stimuli.planted.textures import planted_texture
 
 pytestmark = pytest.mark.skipif(Call is None, reason="no kernel was compiled")
 RATE_HZ = 5000

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modeling import TextureModel
-from modeling.equalizer.bands import band_rms
-from modeling.perception.thresholds import Threshold
-from modeling.scenes.compiled import CompiledTexture
-from modeling.scenes.compiler import compile_scene
-from modeling.scenes.hands import HandRange
-from modeling.scenes.scene import Bound, Scene
+from tactileq.modeling import TextureModel
+from tactileq.modeling.equalizer.bands import band_rms
+from tactileq.modeling.perception.thresholds import Threshold
+from tactileq.modeling.scenes.compiled import CompiledTexture
+from tactileq.modeling.scenes.compiler import compile_scene
+from tactileq.modeling.scenes.hands import HandRange
+from tactileq.modeling.scenes.scene import Bound, Scene
 
 
 def varied_model(

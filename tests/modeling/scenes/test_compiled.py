@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modeling import InputError, Renderer, TextureModel, compile_scene
-from modeling.models.loading import load_model
-from modeling.rendering.plan import plan_for
-from modeling.scenes.compiled import CompiledScene, load_compiled
-from modeling.scenes.cost import scene_bytes, stored_numbers
-from modeling.scenes.scene import Scene
+from tactileq.modeling import InputError, Renderer, TextureModel, compile_scene
+from tactileq.modeling.models.loading import load_model
+from tactileq.modeling.rendering.plan import plan_for
+from tactileq.modeling.scenes.compiled import CompiledScene, load_compiled
+from tactileq.modeling.scenes.cost import scene_bytes, stored_numbers
+from tactileq.modeling.scenes.scene import Scene
 from tests.refusals import refused
 
 ModelMaker = Callable[..., TextureModel]

@@ -13,21 +13,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modeling import InputError, RegressedModel, TextureModel, regressed
-from modeling.arrays import Floats
-from modeling.equalizer.bands import band_response
-from modeling.models.own_peaks import own_peaks
-from modeling.models.parameter_table import Parameters
-from modeling.perception.signs_of_rest import with_signs_chosen_again
-from modeling.rendering.plan import plan_for
-from modeling.scenes.compiled import CompiledTexture
-from modeling.scenes.compiler import compile_scene
-from modeling.scenes.error_maps import ErrorMaps
-from modeling.scenes.hands import HandRange
-from modeling.scenes.limit_losses import clipped_loss_db
-from modeling.scenes.measures import ComparedBand, Errors, errors_between
-from modeling.scenes.places import places_of
-from modeling.scenes.scene import Actuator, Bound, Budget, Scene
+from tactileq.modeling import InputError, RegressedModel, TextureModel, regressed
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.equalizer.bands import band_response
+from tactileq.modeling.models.own_peaks import own_peaks
+from tactileq.modeling.models.parameter_table import Parameters
+from tactileq.modeling.perception.signs_of_rest import with_signs_chosen_again
+from tactileq.modeling.rendering.plan import plan_for
+from tactileq.modeling.scenes.compiled import CompiledTexture
+from tactileq.modeling.scenes.compiler import compile_scene
+from tactileq.modeling.scenes.error_maps import ErrorMaps
+from tactileq.modeling.scenes.hands import HandRange
+from tactileq.modeling.scenes.limit_losses import clipped_loss_db
+from tactileq.modeling.scenes.measures import ComparedBand, Errors, errors_between
+from tactileq.modeling.scenes.places import places_of
+from tactileq.modeling.scenes.scene import Actuator, Bound, Budget, Scene
 from tests.refusals import refused
 
 ModelMaker = Callable[..., TextureModel]

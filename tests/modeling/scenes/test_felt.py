@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from modeling import InputError, TextureModel, simplify
-from modeling.models.own_peaks import own_peaks
-from modeling.perception.signs_of_rest import SignsOfRest
-from modeling.perception.thresholds import Threshold
-from modeling.scenes.compiled import CompiledTexture
-from modeling.scenes.felt import kept_layers
-from modeling.scenes.hands import HandRange
-from modeling.scenes.places import places_of
-from modeling.scenes.scene import Actuator, Scene
-from stimuli.planted.textures import TEXTURES, planted_texture
+from tactileq.modeling import InputError, TextureModel, simplify
+from tactileq.modeling.models.own_peaks import own_peaks
+from tactileq.modeling.perception.signs_of_rest import SignsOfRest
+from tactileq.modeling.perception.thresholds import Threshold
+from tactileq.modeling.scenes.compiled import CompiledTexture
+from tactileq.modeling.scenes.felt import kept_layers
+from tactileq.modeling.scenes.hands import HandRange
+from tactileq.modeling.scenes.places import places_of
+from tactileq.modeling.scenes.scene import Actuator, Scene
+from tactileq.stimuli.planted.textures import TEXTURES, planted_texture
 from tests.refusals import refused
 
 ModelMaker = Callable[..., TextureModel]

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modeling import InputError, Scene, TextureModel, compile_scene
-from modeling.models.loading import models_in
-from modeling.scenes.compiled import FORMAT
-from modeling.scenes.loading import full_models, scene_files, scene_models, scene_name
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import InputError, Scene, TextureModel, compile_scene
+from tactileq.modeling.models.loading import models_in
+from tactileq.modeling.scenes.compiled import FORMAT
+from tactileq.modeling.scenes.loading import full_models, scene_files, scene_models, scene_name
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 
 SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modeling import InputError, TextureModel, similarity
-from modeling.models.parameter_table import Parameters
-from modeling.recordings.spectrum import smooth
-from modeling.scenes.measures import ComparedBand, Errors, errors_between
-from modeling.scenes.scene import Bound
+from tactileq.modeling import InputError, TextureModel, similarity
+from tactileq.modeling.models.parameter_table import Parameters
+from tactileq.modeling.recordings.spectrum import smooth
+from tactileq.modeling.scenes.measures import ComparedBand, Errors, errors_between
+from tactileq.modeling.scenes.scene import Bound
 from tests.refusals import refused
 
 ModelMaker = Callable[..., TextureModel]

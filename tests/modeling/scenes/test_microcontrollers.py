@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from modeling import InputError
-from modeling.errors import shown
-from modeling.scenes.microcontrollers import MicroController, _shipped
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.modeling.scenes.microcontrollers import MicroController, _shipped
 from tests.refusals import refused
 
 NAMES = tuple(_shipped())

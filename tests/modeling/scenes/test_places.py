@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from modeling import InputError, TextureModel
-from modeling.scenes.hands import HandRange, distributed_hand
-from modeling.scenes.places import Places, places_of
+from tactileq.modeling import InputError, TextureModel
+from tactileq.modeling.scenes.hands import HandRange, distributed_hand
+from tactileq.modeling.scenes.places import Places, places_of
 from tests.refusals import refused
 
 ModelMaker = Callable[..., TextureModel]

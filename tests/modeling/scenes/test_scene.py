@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modeling import InputError, Scene
-from modeling.recordings.trajectory import Trajectory
-from modeling.scenes.hands import HandPlaces, HandRange, distributed_hand, recorded_hand
-from modeling.scenes.scene import Bound, Budget
+from tactileq.modeling import InputError, Scene
+from tactileq.modeling.recordings.trajectory import Trajectory
+from tactileq.modeling.scenes.hands import HandPlaces, HandRange, distributed_hand, recorded_hand
+from tactileq.modeling.scenes.scene import Bound, Budget
 from tests.refusals import refused
 
 LEAST = """

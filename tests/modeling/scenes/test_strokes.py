@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modeling import InputError, Renderer, TextureModel, fit_texture
-from modeling.recordings.trajectory import Trajectory
-from modeling.scenes.compiled import CompiledTexture
-from modeling.scenes.hands import HandRange, HandUse, distributed_hand
-from modeling.scenes.hands import recorded_hand as recorded
-from modeling.scenes.measures import ComparedBand, errors_between
-from modeling.scenes.places import ranges_of
-from modeling.scenes.scene import Actuator, Scene
-from modeling.scenes.strokes import Windows, random_stroke, windows_kept
-from stimuli.planted.drawn import draw_surface
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import InputError, Renderer, TextureModel, fit_texture
+from tactileq.modeling.recordings.trajectory import Trajectory
+from tactileq.modeling.scenes.compiled import CompiledTexture
+from tactileq.modeling.scenes.hands import HandRange, HandUse, distributed_hand
+from tactileq.modeling.scenes.hands import recorded_hand as recorded
+from tactileq.modeling.scenes.measures import ComparedBand, errors_between
+from tactileq.modeling.scenes.places import ranges_of
+from tactileq.modeling.scenes.scene import Actuator, Scene
+from tactileq.modeling.scenes.strokes import Windows, random_stroke, windows_kept
+from tactileq.stimuli.planted.drawn import draw_surface
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 
 Compile = Callable[[TextureModel, Scene], CompiledTexture]

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modeling import TextureModel
-from modeling.scenes.hands import HandRange
-from modeling.scenes.places import places_of
-from modeling.scenes.restricting import cut, played, thinned
+from tactileq.modeling import TextureModel
+from tactileq.modeling.scenes.hands import HandRange
+from tactileq.modeling.scenes.places import places_of
+from tactileq.modeling.scenes.restricting import cut, played, thinned
 
 ModelMaker = Callable[..., TextureModel]
 # Ends that single precision may not tell apart count once; others are kept as they are.

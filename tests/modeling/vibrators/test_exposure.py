@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.signal import freqz_sos
 
-from modeling.arrays import Floats
-from modeling.vibrators.exposure import (
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.vibrators.exposure import (
     STANDARD_GRAVITY_M_S2,
     daily_exposure_m_s2,
     hand_arm_sections,
 )
-from stimuli.planted.vibrators import planted_vibrator
+from tactileq.stimuli.planted.vibrators import planted_vibrator
 
 # ISO 5349-1:2001, table A.2: W_h in third octaves.
 TABLE_A2 = {

@@ -13,7 +13,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.signal import butter, sosfilt
 
-from modeling import (
+from tactileq.modeling import (
     PEQ,
     Compensation,
     InputError,
@@ -23,9 +23,9 @@ from modeling import (
     flat_band,
     identify_vibrator,
 )
-from modeling.equalizer.bands import band_response
-from modeling.errors import shown
-from stimuli.planted.vibrators import planted_vibrator
+from tactileq.modeling.equalizer.bands import band_response
+from tactileq.modeling.errors import shown
+from tactileq.stimuli.planted.vibrators import planted_vibrator
 from tests.refusals import refused
 
 RATE_HZ = 5000.0

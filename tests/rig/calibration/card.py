@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
-from modeling.vibrators.compensation import compensation_for
-from rig.capture.input import AudioInput, InputBlock, InputSettings
-from rig.setup.rig_file import RigFile
-from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
-from rig.sound.output import Presented
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.vibrators.compensation import compensation_for
+from tactileq.rig.capture.input import AudioInput, InputBlock, InputSettings
+from tactileq.rig.setup.rig_file import RigFile
+from tactileq.rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
+from tactileq.rig.sound.output import Presented
 
 RATE_HZ = 8000.0
 RIG = """version = 1

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from modeling import InputError
-from modeling.arrays import Floats
-from rig.calibration.alignment import aligned
-from rig.calibration.signals import noise_signal
-from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
+from tactileq.modeling import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.rig.calibration.alignment import aligned
+from tactileq.rig.calibration.signals import noise_signal
+from tactileq.rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
 from tests.refusals import refused
 
 RATE_HZ = 12_000.0

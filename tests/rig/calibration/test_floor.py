@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modeling import InputError
-from rig.calibration.floor import no_contact_floor
-from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
+from tactileq.modeling import InputError
+from tactileq.rig.calibration.floor import no_contact_floor
+from tactileq.rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
 from tests.refusals import refused
 
 RATE_HZ = 8000.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modeling import InputError
-from rig.calibration.latency import (
+from tactileq.modeling import InputError
+from tactileq.rig.calibration.latency import (
     check_latency,
     high_passed,
     onset_s,
@@ -14,8 +14,8 @@ from rig.calibration.latency import (
     stroke_lag_s,
     summary_of,
 )
-from rig.live.memory import BLOCK
-from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
+from tactileq.rig.live.memory import BLOCK
+from tactileq.rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
 from tests.refusals import refused
 
 RATE_HZ = 48_000.0

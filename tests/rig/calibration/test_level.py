@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from modeling import InputError
-from modeling.rendering.limits import Limits
-from rig.calibration.level import band_gain, level_of
-from rig.calibration.signals import noise_signal, usual_rms_g
+from tactileq.modeling import InputError
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.rig.calibration.level import band_gain, level_of
+from tactileq.rig.calibration.signals import noise_signal, usual_rms_g
 from tests.refusals import refused
 
 RATE_HZ = 8000.0

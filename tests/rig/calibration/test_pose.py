@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from modeling import InputError
-from rig.calibration.pose import Touched, pose_of
+from tactileq.modeling import InputError
+from tactileq.rig.calibration.pose import Touched, pose_of
 
 DAY = date(2026, 11, 28)
 

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modeling import InputError
-from rig.calibration import measuring
-from rig.calibration.floor import no_contact_floor
-from rig.calibration.latency import summary_of
-from rig.calibration.level import level_of
-from rig.calibration.measuring import Accelerometer, gaps
-from rig.calibration.opening import accelerometer_input, pressure_reader
-from rig.calibration.steps import (
+from tactileq.modeling import InputError
+from tactileq.rig.calibration import measuring
+from tactileq.rig.calibration.floor import no_contact_floor
+from tactileq.rig.calibration.latency import summary_of
+from tactileq.rig.calibration.level import level_of
+from tactileq.rig.calibration.measuring import Accelerometer, gaps
+from tactileq.rig.calibration.opening import accelerometer_input, pressure_reader
+from tactileq.rig.calibration.steps import (
     check_softly,
     floor_figures,
     latency_figures,
@@ -26,11 +26,11 @@ from rig.calibration.steps import (
     pressure_figures,
     save_vibrator,
 )
-from rig.calibration.trials import checked_loop_back_s, loop_back_s
-from rig.hand.pressure import fit_pressure
-from rig.live.memory import Live
-from rig.setup.rig_file import RigFile
-from rig.simulated.vibrator import SimulatedTransducers
+from tactileq.rig.calibration.trials import checked_loop_back_s, loop_back_s
+from tactileq.rig.hand.pressure import fit_pressure
+from tactileq.rig.live.memory import Live
+from tactileq.rig.setup.rig_file import RigFile
+from tactileq.rig.simulated.vibrator import SimulatedTransducers
 from tests.refusals import refused
 from tests.rig.calibration.card import RATE_HZ, CalculatedCard, rig_file
 

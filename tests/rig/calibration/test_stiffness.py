@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modeling import InputError
-from rig.calibration.stiffness import pressed
+from tactileq.modeling import InputError
+from tactileq.rig.calibration.stiffness import pressed
 
 SHARE = np.linspace(0, 1, 2000)
 FORCE_N = 3 * np.sin(np.pi * SHARE) ** 2

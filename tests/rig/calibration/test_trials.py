@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modeling import InputError, Renderer
-from rig.calibration.measuring import Record
-from rig.calibration.trials import (
+from tactileq.modeling import InputError, Renderer
+from tactileq.rig.calibration.measuring import Record
+from tactileq.rig.calibration.trials import (
     MORE,
     MOVING_S,
     Watched,
@@ -19,8 +19,8 @@ from rig.calibration.trials import (
     stroke_latencies_s,
     write_steps,
 )
-from rig.hand.scripted import ScriptedTrajectory
-from rig.live.memory import BLOCK, READING
+from tactileq.rig.hand.scripted import ScriptedTrajectory
+from tactileq.rig.live.memory import BLOCK, READING
 from tests.refusals import refused
 
 RATE_HZ = 8000.0

@@ -11,8 +11,8 @@ import threading
 
 import numpy as np
 
-from rig.capture.input import AudioInput, InputSettings
-from rig.live.clock import now_s
+from tactileq.rig.capture.input import AudioInput, InputSettings
+from tactileq.rig.live.clock import now_s
 
 
 def main() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rig.live.memory import CONTACT, READING, SIMULATED
+from tactileq.rig.live.memory import CONTACT, READING, SIMULATED
 
 READINGS_HZ = 500.0
 

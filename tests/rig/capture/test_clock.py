@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rig.capture.clock import SampleClock
+from tactileq.rig.capture.clock import SampleClock
 
 RATE_HZ = 48000.0
 

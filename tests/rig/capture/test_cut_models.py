@@ -6,11 +6,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modeling import Recording, RecordingSet, Renderer, TextureModel, fit_texture
-from rig.capture.cutting import cut_strokes
-from rig.capture.grid import StrokeGrid
-from rig.capture.joining import joined
-from stimuli.planted.textures import planted_texture, record_texture, sensed
+from tactileq.modeling import Recording, RecordingSet, Renderer, TextureModel, fit_texture
+from tactileq.rig.capture.cutting import cut_strokes
+from tactileq.rig.capture.grid import StrokeGrid
+from tactileq.rig.capture.joining import joined
+from tactileq.stimuli.planted.textures import planted_texture, record_texture, sensed
 
 RATE_HZ = 6000.0
 FULL_SCALE_G = 50.0

@@ -7,15 +7,15 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from modeling import InputError
-from rig.capture.cutting import (
+from tactileq.modeling import InputError
+from tactileq.rig.capture.cutting import (
     SHORTEST_PART_S,
     StrokeCutter,
     cut_strokes,
     is_clipped,
 )
-from rig.capture.grid import StrokeGrid
-from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, SIMULATED
+from tactileq.rig.capture.grid import StrokeGrid
+from tactileq.rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, SIMULATED
 from tests.refusals import refused
 
 RATE_HZ = 2000.0

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modeling import InputError
-from rig.capture.exploration import explored, grid_for, grid_text
-from rig.capture.grid import StrokeGrid
-from rig.live.memory import CONTACT, FORCE_ASSUMED
+from tactileq.modeling import InputError
+from tactileq.rig.capture.exploration import explored, grid_for, grid_text
+from tactileq.rig.capture.grid import StrokeGrid
+from tactileq.rig.live.memory import CONTACT, FORCE_ASSUMED
 from tests.refusals import refused
 
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modeling import InputError
-from rig.capture.exploration import grid_text
-from rig.capture.grid import NOWHERE, StrokeGrid
+from tactileq.modeling import InputError
+from tactileq.rig.capture.exploration import grid_text
+from tactileq.rig.capture.grid import NOWHERE, StrokeGrid
 from tests.refusals import refused
 
 # Steps of a grid are apart by more than rounding.

@@ -11,10 +11,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from modeling import InputError
-from rig.capture import input as audio
-from rig.capture.input import AudioInput, InputSettings
-from rig.sound import devices
+from tactileq.modeling import InputError
+from tactileq.rig.capture import input as audio
+from tactileq.rig.capture.input import AudioInput, InputSettings
+from tactileq.rig.sound import devices
 from tests.refusals import refused
 
 HERE = Path(__file__).parent

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import butter, sosfilt, welch
 
-from modeling import InputError
-from rig.capture.joining import fade_samples, joined, joined_samples
+from tactileq.modeling import InputError
+from tactileq.rig.capture.joining import fade_samples, joined, joined_samples
 from tests.refusals import refused
 
 RATE_HZ = 5000.0

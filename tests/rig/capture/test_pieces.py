@@ -18,13 +18,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.io import wavfile
 
-from modeling import InputError, Recording, RecordingSet
-from modeling.files.locks import Lock
-from modeling.files.places import locked
-from rig.capture.cutting import StrokePart
-from rig.capture.grid import StrokeGrid
-from rig.capture.joining import joined
-from rig.capture.pieces import PieceStore, Plan
+from tactileq.modeling import InputError, Recording, RecordingSet
+from tactileq.modeling.files.locks import Lock
+from tactileq.modeling.files.places import locked
+from tactileq.rig.capture.cutting import StrokePart
+from tactileq.rig.capture.grid import StrokeGrid
+from tactileq.rig.capture.joining import joined
+from tactileq.rig.capture.pieces import PieceStore, Plan
 from tests.refusals import refused
 
 RATE_HZ = 2000.0

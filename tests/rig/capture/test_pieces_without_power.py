@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modeling import InputError, RecordingSet
-from rig.capture.pieces import PieceStore
+from tactileq.modeling import InputError, RecordingSet
+from tactileq.rig.capture.pieces import PieceStore
 from tests.power_cut import laid_out, watched
 from tests.refusals import refused
 from tests.rig.capture.test_pieces import piece, plan

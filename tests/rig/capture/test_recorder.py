@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modeling import InputError, RecordingSet
-from rig.capture.coverage import Coverage, advice
-from rig.capture.grid import StrokeGrid
-from rig.capture.input import InputBlock
-from rig.capture.pieces import PieceStore, Plan
-from rig.capture.recorder import StrokeRecorder, mains_in
-from rig.live.memory import CONTACT, FORCE_ASSUMED, SIMULATED
+from tactileq.modeling import InputError, RecordingSet
+from tactileq.rig.capture.coverage import Coverage, advice
+from tactileq.rig.capture.grid import StrokeGrid
+from tactileq.rig.capture.input import InputBlock
+from tactileq.rig.capture.pieces import PieceStore, Plan
+from tactileq.rig.capture.recorder import StrokeRecorder, mains_in
+from tactileq.rig.live.memory import CONTACT, FORCE_ASSUMED, SIMULATED
 from tests.refusals import refused
 
 RATE_HZ = 2000.0

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from datetime import date
 from pathlib import Path
 
-from rig.interface import Fault
-from rig.setup.rig_file import RigFile
+from tactileq.rig.interface import Fault
+from tactileq.rig.setup.rig_file import RigFile
 
 TEXT = """
 version = 1

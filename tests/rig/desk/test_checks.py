@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from modeling import InputError
-from rig.desk.checks import Requirements, check_models, check_rig
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import InputError
+from tactileq.rig.desk.checks import Requirements, check_models, check_rig
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.modeling.rendering.lattices import planted_ar
 from tests.refusals import refused
 from tests.rig.desk.rig_files import rig_file

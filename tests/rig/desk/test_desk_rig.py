@@ -16,14 +16,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modeling import InputError, TextureModel
-from rig.desk.checks import Requirements
-from rig.desk.desk_rig import DeskRig
-from rig.desk.stimuli import check_stimulus
-from rig.interface import SURFACES, TextureRig, ToneBurst
-from rig.live.clock import sleep, taking_part
-from rig.live.memory import HEARTBEAT_S
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import InputError, TextureModel
+from tactileq.rig.desk.checks import Requirements
+from tactileq.rig.desk.desk_rig import DeskRig
+from tactileq.rig.desk.stimuli import check_stimulus
+from tactileq.rig.interface import SURFACES, TextureRig, ToneBurst
+from tactileq.rig.live.clock import sleep, taking_part
+from tactileq.rig.live.memory import HEARTBEAT_S
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.modeling.rendering.lattices import planted_ar
 from tests.refusals import refused
 from tests.rig.desk.rig_files import failures, rig_file

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.desk.journal import Journal, Played
-from rig.interface import SURFACES
-from rig.live.memory import BLOCK, BUTTON, CONTACT, FORCE_ASSUMED, GONE, STALE, UNDERFLOW, Live
+from tactileq.rig.desk.journal import Journal, Played
+from tactileq.rig.interface import SURFACES
+from tactileq.rig.live.memory import BLOCK, BUTTON, CONTACT, FORCE_ASSUMED, GONE, STALE, UNDERFLOW, Live
 
 OPENED_S = 1000.0
 

@@ -11,15 +11,15 @@ from pathlib import Path
 
 import pytest
 
-from modeling import InputError
-from modeling.errors import shown
-from rig.desk.lock import rig_locked
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.rig.desk.lock import rig_locked
 from tests.refusals import refused
 
 ROOT = Path(__file__).parents[3]
 HOLDING = """
 import sys
-from rig.desk.lock import rig_locked
+from tactileq.rig.desk.lock import rig_locked
 with rig_locked(sys.argv[1]):
     print("held", flush=True)
     sys.stdin.read()

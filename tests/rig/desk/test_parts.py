@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from rig.desk.parts import sound_output
-from rig.live.memory import Live
-from rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
+from tactileq.rig.desk.parts import sound_output
+from tactileq.rig.live.memory import Live
+from tactileq.rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
 
 
 def test_the_shipped_rig_can_play_all_that_its_limits_allow() -> None:

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.capture.input import InputBlock
-from rig.desk.desk_rig import DeskRig
-from rig.desk.pen_process import PenLog
-from rig.live.clock import sleep
-from rig.simulated.card import DEVICE, SimulatedCard
-from rig.simulated.vibrator import SimulatedTransducers
-from stimuli.planted.textures import planted_texture
+from tactileq.rig.capture.input import InputBlock
+from tactileq.rig.desk.desk_rig import DeskRig
+from tactileq.rig.desk.pen_process import PenLog
+from tactileq.rig.live.clock import sleep
+from tactileq.rig.simulated.card import DEVICE, SimulatedCard
+from tactileq.rig.simulated.vibrator import SimulatedTransducers
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.rig.desk.rig_files import rig_file
 from tests.rig.waiting import follow
 

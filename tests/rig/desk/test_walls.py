@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from experiments.study.wall import WallSection, WallUnder
-from modeling import InputError
-from rig.desk.walls import Walls, check_walls, in_device, usual_wall
-from rig.force.wall import Wall
-from rig.setup.rig_file import RigFile
+from tactileq.experiments.study.wall import WallSection, WallUnder
+from tactileq.modeling import InputError
+from tactileq.rig.desk.walls import Walls, check_walls, in_device, usual_wall
+from tactileq.rig.force.wall import Wall
+from tactileq.rig.setup.rig_file import RigFile
 from tests.rig.desk.rig_files import rig_file
 from tests.rig.force.rig_files import force_rig
 

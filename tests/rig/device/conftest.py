@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from rig.device.emulating import Emulator
+from tactileq.rig.device.emulating import Emulator
 from tests.rig.device.talking import free_port
 
 

@@ -7,18 +7,18 @@ import signal
 import subprocess
 import sys
 
-from rig.device.definition import DEVICE
-from rig.live.clock import sleep
-from rig.wire.conversation import Conversation
-from rig.wire.transports import opened_transport
+from tactileq.rig.device.definition import DEVICE
+from tactileq.rig.live.clock import sleep
+from tactileq.rig.wire.conversation import Conversation
+from tactileq.rig.wire.transports import opened_transport
 
 BAUD = 1_000_000
 HOST = """
 import sys
-from rig.device.definition import DEVICE
-from rig.live.clock import now_s, sleep, taking_part
-from rig.wire.link import Link
-from rig.wire.transports import opened_transport
+from tactileq.rig.device.definition import DEVICE
+from tactileq.rig.live.clock import now_s, sleep, taking_part
+from tactileq.rig.wire.link import Link
+from tactileq.rig.wire.transports import opened_transport
 with taking_part(), Link(lambda: opened_transport(sys.argv[1], 1_000_000), DEVICE) as link:
     while link.read("State") == 0:
         sleep(0.01)

@@ -7,8 +7,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from rig.device.emulating import Emulator
-from rig.device.virtual import TICK_HZ
+from tactileq.rig.device.emulating import Emulator
+from tactileq.rig.device.virtual import TICK_HZ
 from tests.rig.device.compiled import compiled_walks
 from tests.rig.device.killing import ticks_after_kill
 from tests.rig.device.talking import Talk

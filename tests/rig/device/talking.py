@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from rig.device.definition import DEVICE
-from rig.device.registers import (
+from tactileq.rig.device.definition import DEVICE
+from tactileq.rig.device.registers import (
     DeviceCause,
     DeviceCommand,
     DeviceSimulation,
     DeviceSource,
     DeviceState,
 )
-from rig.device.virtual import TICK_HZ, VirtualBoard, VirtualTransport
-from rig.wire.conversation import RECORD, Block, Conversation
+from tactileq.rig.device.virtual import TICK_HZ, VirtualBoard, VirtualTransport
+from tactileq.rig.wire.conversation import RECORD, Block, Conversation
 
 
 class Talk(Conversation):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rig.device.geometry import CableGeometry
-from rig.device.registers import (
+from tactileq.rig.device.geometry import CableGeometry
+from tactileq.rig.device.registers import (
     DeviceCause,
     DeviceCommand,
     DeviceFlags,
@@ -14,7 +14,7 @@ from rig.device.registers import (
     DeviceSource,
     DeviceState,
 )
-from rig.device.virtual import TICK_HZ, compiled_device
+from tactileq.rig.device.virtual import TICK_HZ, compiled_device
 from tests.rig.device.talking import Talk, joined
 
 X, Z, LEFT, RIGHT, HAND, _, _, WARM, _, RMS = range(10)  # of the register Emerged

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modeling import InputError
-from rig.device.definition import DEVICE
-from rig.device.models import device_model
-from rig.device.registers import (
+from tactileq.modeling import InputError
+from tactileq.rig.device.definition import DEVICE
+from tactileq.rig.device.models import device_model
+from tactileq.rig.device.registers import (
     DeviceCause,
     DeviceCommand,
     DeviceSimulation,
@@ -16,10 +16,10 @@ from rig.device.registers import (
     DeviceState,
     DeviceStatus,
 )
-from rig.device.virtual import TICK_HZ, VirtualBoard, VirtualTransport
-from rig.wire.conversation import Conversation, DeviceRefused
-from rig.wire.transports import TransportLost
-from stimuli.planted.textures import planted_texture
+from tactileq.rig.device.virtual import TICK_HZ, VirtualBoard, VirtualTransport
+from tactileq.rig.wire.conversation import Conversation, DeviceRefused
+from tactileq.rig.wire.transports import TransportLost
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 from tests.rig.device.talking import Talk, joined
 

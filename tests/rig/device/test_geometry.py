@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modeling import InputError
-from rig.device.geometry import CableGeometry
+from tactileq.modeling import InputError
+from tactileq.rig.device.geometry import CableGeometry
 from tests.refusals import refused
 
 DEVICE = CableGeometry()

@@ -13,20 +13,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modeling import InputError
-from rig.desk.desk_rig import DeskRig
-from rig.desk.walls import largest_of
-from rig.device.emulating import Emulator
-from rig.device.hand import DeviceHand
-from rig.device.registers import DeviceCause, DeviceState
-from rig.force.hand import ForceHand
-from rig.force.settings import ForceSettings
-from rig.force.states import Cause, State
-from rig.force.wall import Wall
-from rig.hand.settings import HandSettings
-from rig.live.memory import CONTACT, FORCE_COMMANDED, GONE, SIMULATED, Live
-from rig.setup.rig_file import RigFile
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import InputError
+from tactileq.rig.desk.desk_rig import DeskRig
+from tactileq.rig.desk.walls import largest_of
+from tactileq.rig.device.emulating import Emulator
+from tactileq.rig.device.hand import DeviceHand
+from tactileq.rig.device.registers import DeviceCause, DeviceState
+from tactileq.rig.force.hand import ForceHand
+from tactileq.rig.force.settings import ForceSettings
+from tactileq.rig.force.states import Cause, State
+from tactileq.rig.force.wall import Wall
+from tactileq.rig.hand.settings import HandSettings
+from tactileq.rig.live.memory import CONTACT, FORCE_COMMANDED, GONE, SIMULATED, Live
+from tactileq.rig.setup.rig_file import RigFile
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 from tests.rig.desk.rig_files import failures, rig_file
 from tests.rig.waiting import follow, wait_until

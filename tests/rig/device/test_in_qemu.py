@@ -14,13 +14,13 @@ from typing import Any
 
 import pytest
 
-from benches.rendering.rivals import layered_texture
-from rig.device.definition import DEVICE
-from rig.device.emulating import KINDS, Emulator, Kind, build_firmware
-from rig.device.models import device_model
-from rig.device.registers import DeviceCause, DeviceCommand, DeviceSource
-from rig.wire.conversation import Conversation, DeviceRefused
-from rig.wire.transports import Transport, opened_transport
+from tactileq.benches.rendering.rivals import layered_texture
+from tactileq.rig.device.definition import DEVICE
+from tactileq.rig.device.emulating import KINDS, Emulator, Kind, build_firmware
+from tactileq.rig.device.models import device_model
+from tactileq.rig.device.registers import DeviceCause, DeviceCommand, DeviceSource
+from tactileq.rig.wire.conversation import Conversation, DeviceRefused
+from tactileq.rig.wire.transports import Transport, opened_transport
 from tests.rig.device.independent_client import Refused
 from tests.rig.device.killing import BAUD
 from tests.rig.device.test_process import (

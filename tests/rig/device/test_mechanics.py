@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from rig.device.geometry import CableGeometry
-from rig.device.virtual import TICK_HZ, compiled_device
-from stimuli.planted.vibrators import SimulatedVibrator
+from tactileq.rig.device.geometry import CableGeometry
+from tactileq.rig.device.virtual import TICK_HZ, compiled_device
+from tactileq.stimuli.planted.vibrators import SimulatedVibrator
 
 TICK_S = 1 / TICK_HZ
 GEOMETRY = CableGeometry()
@@ -197,7 +197,7 @@ def response(one: Mechanics, hz: float, amplitude_g: float) -> complex:
 
 @pytest.mark.parametrize("hz", [20.0, 60.0, 80.0, 100.0, 400.0])
 def test_the_vibrator_responds_as_a_mass_on_a_spring(hz: float) -> None:
-    """That of stimuli.planted.vibrators: 80 Hz, quality 3, gain 1 far above."""
+    """That of tactileq.stimuli.planted.vibrators: 80 Hz, quality 3, gain 1 far above."""
     one = Mechanics(noise_g=0.0)
     planted = SimulatedVibrator(80.0, 3.0, float(TICK_HZ)).response([hz])[0]
     assert abs(response(one, hz, 0.5)) == pytest.approx(abs(planted), rel=0.01)

@@ -7,13 +7,13 @@ import struct
 import numpy as np
 import pytest
 
-from benches.rendering.rivals import layered_texture
-from modeling import InputError, Limits, Renderer, TextureModel
-from modeling.vibrators.compensation import Compensation
-from rig.device.models import DEVICE_LIMITS, device_model
-from rig.device.registers import DeviceSource, DeviceStatus
-from rig.wire.conversation import Block, DeviceRefused, Hello
-from stimuli.planted.textures import planted_texture
+from tactileq.benches.rendering.rivals import layered_texture
+from tactileq.modeling import InputError, Limits, Renderer, TextureModel
+from tactileq.modeling.vibrators.compensation import Compensation
+from tactileq.rig.device.models import DEVICE_LIMITS, device_model
+from tactileq.rig.device.registers import DeviceSource, DeviceStatus
+from tactileq.rig.wire.conversation import Block, DeviceRefused, Hello
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 from tests.rig.device.talking import Talk, joined
 

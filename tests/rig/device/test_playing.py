@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from modeling import Vibrator
-from modeling.vibrators.exposure import hand_arm_sections
-from rig.device.models import DEVICE_LIMITS, device_model
-from rig.device.registers import DeviceCommand, DeviceSource, DeviceState, DeviceStatus
-from rig.device.virtual import TICK_HZ
-from rig.wire.conversation import DeviceRefused
-from stimuli.planted.textures import planted_texture
-from stimuli.planted.vibrators import planted_vibrator
+from tactileq.modeling import Vibrator
+from tactileq.modeling.vibrators.exposure import hand_arm_sections
+from tactileq.rig.device.models import DEVICE_LIMITS, device_model
+from tactileq.rig.device.registers import DeviceCommand, DeviceSource, DeviceState, DeviceStatus
+from tactileq.rig.device.virtual import TICK_HZ
+from tactileq.rig.wire.conversation import DeviceRefused
+from tactileq.stimuli.planted.textures import planted_texture
+from tactileq.stimuli.planted.vibrators import planted_vibrator
 from tests.rig.device.talking import Talk, joined
 from tests.rig.device.test_models import HELLO
 

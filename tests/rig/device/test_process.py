@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modeling import InputError
-from rig.device.definition import DEVICE
-from rig.device.emulating import KINDS, Emulator, Kind, check_baud
-from rig.device.models import device_model
-from rig.device.registers import DeviceCommand, DeviceSource, DeviceState
-from rig.device.virtual import TICK_HZ
-from rig.live.clock import now_s, readable, sleep, taking_part
-from rig.wire.conversation import Conversation
-from rig.wire.transports import opened_transport
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import InputError
+from tactileq.rig.device.definition import DEVICE
+from tactileq.rig.device.emulating import KINDS, Emulator, Kind, check_baud
+from tactileq.rig.device.models import device_model
+from tactileq.rig.device.registers import DeviceCommand, DeviceSource, DeviceState
+from tactileq.rig.device.virtual import TICK_HZ
+from tactileq.rig.live.clock import now_s, readable, sleep, taking_part
+from tactileq.rig.wire.conversation import Conversation
+from tactileq.rig.wire.transports import opened_transport
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 from tests.rig.device import independent_client
 from tests.rig.device.independent_client import Client

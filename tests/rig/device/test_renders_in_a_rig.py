@@ -10,18 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.feel.opening import desk
-from modeling import InputError
-from rig.desk.checks import check_models
-from rig.desk.desk_rig import DeskRig
-from rig.desk.parts import vibration_output
-from rig.device.emulating import Emulator
-from rig.interface import Stimulus, ToneBurst
-from rig.live.clock import sleep
-from rig.live.memory import HEARTBEAT_S, Live
-from rig.setup.rig_file import RigFile
-from rig.sound.supervision import HALTED
-from stimuli.planted.textures import planted_texture
+from tactileq.experiments.feel.opening import desk
+from tactileq.modeling import InputError
+from tactileq.rig.desk.checks import check_models
+from tactileq.rig.desk.desk_rig import DeskRig
+from tactileq.rig.desk.parts import vibration_output
+from tactileq.rig.device.emulating import Emulator
+from tactileq.rig.interface import Stimulus, ToneBurst
+from tactileq.rig.live.clock import sleep
+from tactileq.rig.live.memory import HEARTBEAT_S, Live
+from tactileq.rig.setup.rig_file import RigFile
+from tactileq.rig.sound.supervision import HALTED
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.modeling.rendering.lattices import planted_ar
 from tests.refusals import refused
 from tests.rig.desk.rig_files import failures

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from rig.wire.envelope import WireFrame
+from tactileq.rig.wire.envelope import WireFrame
 from tests.rig.device.compiled import ROOT, compiled_walks
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.force.standin import StandIn
+from tactileq.rig.force.standin import StandIn
 from tests.rig.force.rig_files import standing_in
 
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 import json
 import sys
 
-from rig.desk.desk_rig import DeskRig
-from rig.force.hand import ForceHand
-from rig.live.clock import sleep, taking_part
-from rig.setup.rig_file import RigFile
-from stimuli.planted.textures import planted_texture
+from tactileq.rig.desk.desk_rig import DeskRig
+from tactileq.rig.force.hand import ForceHand
+from tactileq.rig.live.clock import sleep, taking_part
+from tactileq.rig.setup.rig_file import RigFile
+from tactileq.stimuli.planted.textures import planted_texture
 
 model = planted_texture("PVC")
 with DeskRig(RigFile.load(sys.argv[1]), override="a test") as rig, taking_part():

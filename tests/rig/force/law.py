@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from rig.force.process import limits_of
-from rig.force.settings import ForceSettings
-from rig.force.states import Cause, ForceEvent, State
-from rig.force.wall import Wall
-from rig.live.compiled import compiled
+from tactileq.rig.force.process import limits_of
+from tactileq.rig.force.settings import ForceSettings
+from tactileq.rig.force.states import Cause, ForceEvent, State
+from tactileq.rig.force.wall import Wall
+from tactileq.rig.live.compiled import compiled
 
 TICK_S = 0.001
 WALL = Wall(stiffness_n_per_mm=1.0, width_mm=80.0, length_mm=80.0)

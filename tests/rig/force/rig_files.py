@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from rig.force.standin import StandIn
-from rig.setup.rig_file import RigFile
+from tactileq.rig.force.standin import StandIn
+from tactileq.rig.setup.rig_file import RigFile
 from tests.rig.desk.rig_files import rig_file
 
 # As late as the watchdog allows: on a loaded machine an ordinary process is late, too.

@@ -12,15 +12,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import rig.force
-from rig.force.settings import ForceSettings, Pose
-from rig.force.states import SENTENCES, Cause, ForceEvent, State
-from rig.force.wall import Wall, largest_stiffness_n_per_mm
-from rig.hand.tracking import TrackingFilter
-from rig.live.compiled import compiled
+import tactileq.rig.force
+from tactileq.rig.force.settings import ForceSettings, Pose
+from tactileq.rig.force.states import SENTENCES, Cause, ForceEvent, State
+from tactileq.rig.force.wall import Wall, largest_stiffness_n_per_mm
+from tactileq.rig.hand.tracking import TrackingFilter
+from tactileq.rig.live.compiled import compiled
 from tests.rig.force.law import TICK_S, WALL, Law
 
-HEADERS = Path(rig.force.__file__).parent
+HEADERS = Path(tactileq.rig.force.__file__).parent
 # State and event → state; every other event leaves a state as it is (docs/force-device.md#states).
 TABLE = {
     (State.BOOT, ForceEvent.SENSED): State.IDLE,

@@ -18,18 +18,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modeling import InputError
-from rig.desk.desk_rig import DeskRig
-from rig.force.dhd import DhdLibrary
-from rig.force.hand import ForceHand
-from rig.force.settings import ForceSettings
-from rig.force.standin import StandIn
-from rig.force.states import SENTENCES, Cause, State
-from rig.force.wall import Wall
-from rig.hand.settings import HandSettings
-from rig.live.clock import now_s, sleep, taking_part
-from rig.live.memory import BUTTON, CONTACT, FORCE_COMMANDED, GONE, HEARTBEAT_S, SIMULATED, Live
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import InputError
+from tactileq.rig.desk.desk_rig import DeskRig
+from tactileq.rig.force.dhd import DhdLibrary
+from tactileq.rig.force.hand import ForceHand
+from tactileq.rig.force.settings import ForceSettings
+from tactileq.rig.force.standin import StandIn
+from tactileq.rig.force.states import SENTENCES, Cause, State
+from tactileq.rig.force.wall import Wall
+from tactileq.rig.hand.settings import HandSettings
+from tactileq.rig.live.clock import now_s, sleep, taking_part
+from tactileq.rig.live.memory import BUTTON, CONTACT, FORCE_COMMANDED, GONE, HEARTBEAT_S, SIMULATED, Live
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.rig.force.rig_files import force_rig
 from tests.rig.waiting import follow, wait_until
 

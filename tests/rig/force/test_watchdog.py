@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import pytest
 
-from rig.force.control import Control
-from rig.force.settings import MISSED_S
-from rig.force.states import State
-from rig.live.clock import now_s, sleep, taking_part
-from rig.live.compiled import compiled
-from rig.live.memory import Live
+from tactileq.rig.force.control import Control
+from tactileq.rig.force.settings import MISSED_S
+from tactileq.rig.force.states import State
+from tactileq.rig.live.clock import now_s, sleep, taking_part
+from tactileq.rig.live.compiled import compiled
+from tactileq.rig.live.memory import Live
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from itertools import count
 
-from rig.hand.serial_line import SensorLine, crc, encode
-from rig.live.clock import now_s, sleep, taking_part
+from tactileq.rig.hand.serial_line import SensorLine, crc, encode
+from tactileq.rig.live.clock import now_s, sleep, taking_part
 
 PERIOD_US = 2000
 

@@ -16,11 +16,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from modeling import InputError
-from rig.hand import evdev
-from rig.hand.devices import connected_devices
-from rig.hand.evdev import EventDevice, input_devices
-from rig.hand.events import (
+from tactileq.modeling import InputError
+from tactileq.rig.hand import evdev
+from tactileq.rig.hand.devices import connected_devices
+from tactileq.rig.hand.evdev import EventDevice, input_devices
+from tactileq.rig.hand.events import (
     ABS_PRESSURE,
     ABS_X,
     ABS_Y,
@@ -38,12 +38,12 @@ from rig.hand.events import (
     SYN_DROPPED,
     SYN_REPORT,
 )
-from rig.hand.following import Follower
-from rig.hand.loop import HandLoop
-from rig.hand.messages import Counts, Firmware, HandFault
-from rig.hand.settings import HandSettings
-from rig.live.clock import now_s
-from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, Live
+from tactileq.rig.hand.following import Follower
+from tactileq.rig.hand.loop import HandLoop
+from tactileq.rig.hand.messages import Counts, Firmware, HandFault
+from tactileq.rig.hand.settings import HandSettings
+from tactileq.rig.live.clock import now_s
+from tactileq.rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, Live
 
 TABLET = {"key": [BTN_TOOL_PEN, BTN_TOUCH, BTN_STYLUS], "abs": [ABS_X, ABS_Y, ABS_PRESSURE]}
 MOUSE = {"key": [BTN_LEFT], "rel": [REL_X, REL_Y]}
@@ -158,7 +158,7 @@ def test_serial_ports_are_told_beside_input_devices(
     ports = [
         SimpleNamespace(device=f"/dev/ttyACM{n}", description=d) for n, d in ((1, None), (0, "X"))
     ]
-    monkeypatch.setattr("rig.wire.ports.list_ports.comports", lambda: ports)
+    monkeypatch.setattr("tactileq.rig.wire.ports.list_ports.comports", lambda: ports)
     assert list(map(str, connected_devices())) == [
         f"A Mouse ({desk.dev / 'event4'}, mouse)",
         "X (/dev/ttyACM0, serial)",
@@ -216,7 +216,7 @@ def test_a_mouse_has_an_assumed_force_on_every_reading(desk: Desk, live: Live) -
 def test_unplugged_it_is_gone_at_once_and_taken_up_again(
     desk: Desk, live: Live, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rig.hand.loop.AGAIN_S", 0.05)
+    monkeypatch.setattr("tactileq.rig.hand.loop.AGAIN_S", 0.05)
     desk.connect(3, "Small Tablet Pen", TABLET)
     told: list[HandFault | Counts | Firmware] = []
     named = HandSettings(kind="tablet", device="Small Tablet Pen", pressure_points=POINTS)

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rig.hand import evdev
-from rig.hand.events import (
+from tactileq.rig.hand import evdev
+from tactileq.rig.hand.events import (
     ABS_PRESSURE,
     ABS_X,
     ABS_Y,
@@ -36,7 +36,7 @@ from rig.hand.events import (
     MouseHand,
     PenHand,
 )
-from rig.hand.pressure import PressureCurve
+from tactileq.rig.hand.pressure import PressureCurve
 
 NAMES = (
     *("EV_SYN", "EV_KEY", "EV_REL", "EV_ABS", "SYN_REPORT", "SYN_DROPPED", "REL_X", "REL_Y"),

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modeling import InputError
-from rig.hand.pressure import PressureCurve, fit_pressure
+from tactileq.modeling import InputError
+from tactileq.rig.hand.pressure import PressureCurve, fit_pressure
 from tests.refusals import refused
 
 WEIGHTS_N = [0.2, 0.5, 1.0, 2.0, 3.0, 4.0]

@@ -13,18 +13,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modeling import InputError
-from modeling.files.columns import names
-from modeling.files.tables import write_table
-from rig.hand.following import Follower
-from rig.hand.reader import HandReader
-from rig.hand.sample import Sample
-from rig.hand.scripted import SCRIPT_COLUMNS
-from rig.hand.settings import HandSettings
-from rig.hand.window import PointerDevice
-from rig.live.clock import now_s, sleep
-from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, SIMULATED, Live
-from rig.sound.messages import Silence
+from tactileq.modeling import InputError
+from tactileq.modeling.files.columns import names
+from tactileq.modeling.files.tables import write_table
+from tactileq.rig.hand.following import Follower
+from tactileq.rig.hand.reader import HandReader
+from tactileq.rig.hand.sample import Sample
+from tactileq.rig.hand.scripted import SCRIPT_COLUMNS
+from tactileq.rig.hand.settings import HandSettings
+from tactileq.rig.hand.window import PointerDevice
+from tactileq.rig.live.clock import now_s, sleep
+from tactileq.rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, SIMULATED, Live
+from tactileq.rig.sound.messages import Silence
 from tests.refusals import refused
 from tests.rig.waiting import follow, is_gone, wait_until
 
@@ -174,8 +174,8 @@ def test_who_watches_does_not_kill_for_time_in_which_it_was_held_up_itself(
     reader._closing = Closing()  # type: ignore[assignment]
     reader._child = Process()  # type: ignore[assignment]
     reader._alive_s = 0.0
-    monkeypatch.setattr("rig.hand.reader.now_s", lambda: now[0])
-    monkeypatch.setattr("rig.hand.reader.wait_for", lambda wait, seconds: wait(seconds))
+    monkeypatch.setattr("tactileq.rig.hand.reader.now_s", lambda: now[0])
+    monkeypatch.setattr("tactileq.rig.hand.reader.wait_for", lambda wait, seconds: wait(seconds))
     reader._watch()
     assert killed_s == [31.1]  # no reading for over a second in which it looked
 
@@ -233,9 +233,9 @@ def test_the_process_ends_when_its_parent_is_killed(live: Live) -> None:
             sys.executable,
             "-c",
             "import sys, time\n"
-            "from rig.hand.reader import HandReader\n"
-            "from rig.hand.settings import HandSettings\n"
-            "from rig.live.memory import Live\n"
+            "from tactileq.rig.hand.reader import HandReader\n"
+            "from tactileq.rig.hand.settings import HandSettings\n"
+            "from tactileq.rig.live.memory import Live\n"
             "live = Live.attach(sys.argv[1])\n"
             "reader = HandReader(live, HandSettings(kind='scripted', script='hold'))\n"
             "reader.open()\n"

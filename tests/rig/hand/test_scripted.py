@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modeling import InputError
-from modeling.files.columns import names
-from modeling.files.tables import write_table
-from rig.hand.scripted import (
+from tactileq.modeling import InputError
+from tactileq.modeling.files.columns import names
+from tactileq.modeling.files.tables import write_table
+from tactileq.rig.hand.scripted import (
     SCRIPT_COLUMNS,
     ScriptedHand,
     ScriptedTrajectory,
@@ -18,7 +18,7 @@ from rig.hand.scripted import (
     Strokes,
     script_of,
 )
-from rig.hand.settings import HandSettings
+from tactileq.rig.hand.settings import HandSettings
 from tests.refusals import refused
 
 

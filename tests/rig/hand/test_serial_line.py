@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rig.hand.serial_line import (
+from tactileq.rig.hand.serial_line import (
     CLOCK_US,
     LONGEST_LINE,
     LineReader,

@@ -11,17 +11,17 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from modeling import InputError
-from rig.hand import serial_sensor
-from rig.hand.loop import HandLoop
-from rig.hand.reader import HandReader
-from rig.hand.sample import DeviceLost
-from rig.hand.serial_line import SensorLine, encode
-from rig.hand.serial_sensor import SerialSensor
-from rig.hand.settings import HandSettings
-from rig.live.clock import sleep
-from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, Live
-from rig.wire import ports
+from tactileq.modeling import InputError
+from tactileq.rig.hand import serial_sensor
+from tactileq.rig.hand.loop import HandLoop
+from tactileq.rig.hand.reader import HandReader
+from tactileq.rig.hand.sample import DeviceLost
+from tactileq.rig.hand.serial_line import SensorLine, encode
+from tactileq.rig.hand.serial_sensor import SerialSensor
+from tactileq.rig.hand.settings import HandSettings
+from tactileq.rig.live.clock import sleep
+from tactileq.rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, Live
+from tactileq.rig.wire import ports
 from tests.refusals import refused
 from tests.rig.hand.board import PERIOD_US, Board, at_constant_speed, stating
 from tests.rig.waiting import is_gone, wait_until

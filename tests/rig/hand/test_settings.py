@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from modeling import InputError
-from rig.hand.settings import HandSettings
+from tactileq.modeling import InputError
+from tactileq.rig.hand.settings import HandSettings
 from tests.refusals import refused
 
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modeling.arrays import Floats
-from rig.hand.tracking import NEW_STROKE_S, REST_S, TrackingFilter, noise_gain_per_s
+from tactileq.modeling.arrays import Floats
+from tactileq.rig.hand.tracking import NEW_STROKE_S, REST_S, TrackingFilter, noise_gain_per_s
 
 DELAY_S = 0.01
 

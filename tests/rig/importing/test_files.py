@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.io import wavfile
 from scipy.signal import welch
 
-from modeling import InputError, RecordingSet
-from rig.importing.csv_columns import parse_columns
-from rig.importing.files import import_csv, import_csv_file, import_wav, import_wav_file, usable
-from rig.importing.labels import Label, labels_from_table
+from tactileq.modeling import InputError, RecordingSet
+from tactileq.rig.importing.csv_columns import parse_columns
+from tactileq.rig.importing.files import import_csv, import_csv_file, import_wav, import_wav_file, usable
+from tactileq.rig.importing.labels import Label, labels_from_table
 from tests.refusals import check_refusal, refused
 
 LABEL = Label("oak", 100.0, 1.0)

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import freqz, welch
 
-from modeling import InputError, fit_ar, fit_texture, similarity
-from rig.importing.hatt import HattTexture
-from rig.importing.hatt_reader import load_hatt
+from tactileq.modeling import InputError, fit_ar, fit_texture, similarity
+from tactileq.rig.importing.hatt import HattTexture
+from tactileq.rig.importing.hatt_reader import load_hatt
 from tests.refusals import refused
 
 Xml = Callable[..., str]
@@ -142,7 +142,7 @@ def test_frequencies_are_blended(load: Callable[[str], HattTexture], hatt_xml: X
     middle = texture.ar_frequencies[[3, 4]].mean(axis=0)
     roots = np.roots(texture.filter(230, 2.75).denominator)
     assert np.abs(roots).max() < 1
-    from modeling.models.line_spectral import line_spectral_frequencies
+    from tactileq.modeling.models.line_spectral import line_spectral_frequencies
 
     assert line_spectral_frequencies(texture.filter(230, 2.75).denominator[1:]) == pytest.approx(
         middle, abs=1e-9

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from modeling import InputError
-from rig.importing.hatt import HattTexture
-from rig.importing.hatt_grid import spanning_grid
-from rig.importing.hatt_reader import load_hatt
+from tactileq.modeling import InputError
+from tactileq.rig.importing.hatt import HattTexture
+from tactileq.rig.importing.hatt_grid import spanning_grid
+from tactileq.rig.importing.hatt_reader import load_hatt
 from tests.refusals import refused
 
 Xml = Callable[..., str]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modeling import Recording
-from rig.importing.plausible import doubts_about
-from stimuli.planted.textures import CATALOGUE, planted_texture, record_texture
+from tactileq.modeling import Recording
+from tactileq.rig.importing.plausible import doubts_about
+from tactileq.stimuli.planted.textures import CATALOGUE, planted_texture, record_texture
 
 NOISE = np.random.default_rng(7).standard_normal(2000)
 

@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from modeling.rendering.compiled import filled, filled_texture, memory_reals
-from modeling.rendering.lattice import lattice_fields
-from modeling.rendering.limits import Limits
-from modeling.rendering.noise import stream_key
-from modeling.rendering.plan import RenderPlan, plan_for
-from modeling.vibrators.exposure import hand_arm_sections
-from rig.live.compiled import compiled
-from rig.live.memory import CONTACT, OLDEST_READING_S, Live, Rows
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling.rendering.compiled import filled, filled_texture, memory_reals
+from tactileq.modeling.rendering.lattice import lattice_fields
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.modeling.rendering.noise import stream_key
+from tactileq.modeling.rendering.plan import RenderPlan, plan_for
+from tactileq.modeling.vibrators.exposure import hand_arm_sections
+from tactileq.rig.live.compiled import compiled
+from tactileq.rig.live.memory import CONTACT, OLDEST_READING_S, Live, Rows
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.modeling.rendering.lattices import planted_ar
 
 RATE_HZ = 48000.0

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from modeling.models.ar_model import ARModel
-from modeling.rendering.compiled import CompiledEngine
-from modeling.rendering.limits import Limits
-from modeling.rendering.noise import stream_key
-from modeling.rendering.plan import plan_for
-from modeling.rendering.reference.engine import PythonEngine
-from modeling.rendering.reference.lattice import LatticeFilter
-from rig.live.memory import GONE, OLDEST_READING_S, Live, Rows
+from tactileq.modeling.models.ar_model import ARModel
+from tactileq.modeling.rendering.compiled import CompiledEngine
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.modeling.rendering.noise import stream_key
+from tactileq.modeling.rendering.plan import plan_for
+from tactileq.modeling.rendering.reference.engine import PythonEngine
+from tactileq.modeling.rendering.reference.lattice import LatticeFilter
+from tactileq.rig.live.memory import GONE, OLDEST_READING_S, Live, Rows
 
 PIECE = 256  # samples that the callback renders in one go
 

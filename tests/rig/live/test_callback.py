@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter, sosfilt
 
-from modeling.rendering.limits import Limits
-from modeling.vibrators.exposure import hand_arm_sections
-from rig.live.memory import CONTACT, GONE, NO_HEARTBEAT, STALE, Live
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.modeling.vibrators.exposure import hand_arm_sections
+from tactileq.rig.live.memory import CONTACT, GONE, NO_HEARTBEAT, STALE, Live
 from tests.modeling.rendering.lattices import in_python, planted_ar
 from tests.rig.live.callback import FADE, RATE_HZ, Array, Callback
 

@@ -12,20 +12,20 @@ from pathlib import Path
 
 import pytest
 
-from modeling import InputError
-from rig.live import child
-from rig.live.child import Child, ChildLost
-from rig.live.messages import Done, Message, Refused
-from rig.sound.messages import Mask, Silence
+from tactileq.modeling import InputError
+from tactileq.rig.live import child
+from tactileq.rig.live.child import Child, ChildLost
+from tactileq.rig.live.messages import Done, Message, Refused
+from tactileq.rig.sound.messages import Mask, Silence
 from tests.refusals import refused
 
 ROOT = Path(__file__).parents[3]
 
 PROGRAM = """
 import os, sys, time
-from modeling.errors import InputError
-from rig.live.driven import Parent
-from rig.live.messages import Done, Message, Refused
+from tactileq.modeling.errors import InputError
+from tactileq.rig.live.driven import Parent
+from tactileq.rig.live.messages import Done, Message, Refused
 
 class Say(Message, frozen=True):
     text: str
@@ -180,14 +180,14 @@ def test_its_rooms_are_those_of_its_parent_though_not_installed_and_though_files
     for file in (f"{name}.py" for name in (*names, "modeling/face", "modeling/errors")):
         shutil.copy(ROOT / file, house / file)
     (house / "rig/telling.py").write_text(
-        "import modeling.errors\nfrom rig.live.driven import Parent\n"
-        "raise SystemExit(modeling.errors.__file__)\n"
+        "import tactileq.modeling.errors\nfrom tactileq.rig.live.driven import Parent\n"
+        "raise SystemExit(tactileq.modeling.errors.__file__)\n"
     )
     work.mkdir()
     for room in ("rig", "modeling"):
         (work / f"{room}.py").write_text("raise SystemExit('not this one')\n")
     program = (
-        f"import sys; sys.path.insert(0, {str(house)!r}); from rig.live.child import Child; "
+        f"import sys; sys.path.insert(0, {str(house)!r}); from tactileq.rig.live.child import Child; "
         "child = Child('rig.telling', None); print(child.end()); child.close()"
     )
     told = subprocess.run(
@@ -204,7 +204,7 @@ def test_a_suspended_process_does_not_hold_up_who_sends_it_a_long_message(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """It reads nothing, and the pipe is full long before the message's end."""
-    monkeypatch.setattr("rig.live.child.ANSWER_S", 0.3)
+    monkeypatch.setattr("tactileq.rig.live.child.ANSWER_S", 0.3)
     process = started()
     os.kill(process.pid, signal.SIGSTOP)
     with pytest.raises(ChildLost, match="SIGKILL"):

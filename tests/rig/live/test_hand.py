@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 import serial
 
-from modeling import Renderer
-from modeling.arrays import Floats
-from modeling.rendering.limits import Limits
-from rig.hand import loop, serial_sensor
-from rig.hand.loop import HandLoop
-from rig.hand.serial_line import SensorLine, encode
-from rig.hand.serial_sensor import SerialSensor
-from rig.hand.settings import HandSettings
-from rig.live.memory import Live
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import Renderer
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.rig.hand import loop, serial_sensor
+from tactileq.rig.hand.loop import HandLoop
+from tactileq.rig.hand.serial_line import SensorLine, encode
+from tactileq.rig.hand.serial_sensor import SerialSensor
+from tactileq.rig.hand.settings import HandSettings
+from tactileq.rig.live.memory import Live
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.rig.live.callback import FADE, RATE_HZ, Array, Callback
 from tests.rig.live.replay import Log, engine_of
 

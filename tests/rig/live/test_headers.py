@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-import modeling.rendering
-import rig.live
+import tactileq.modeling.rendering
+import tactileq.rig.live
 
-LIVE = Path(rig.live.__file__).parent
-KERNEL = Path(modeling.rendering.__file__).parent
+LIVE = Path(tactileq.rig.live.__file__).parent
+KERNEL = Path(tactileq.modeling.rendering.__file__).parent
 PROGRAM = """
 #include "sound.h"
 int (*callback)(const void *, void *, unsigned long, const void *, unsigned long, void *);

@@ -12,19 +12,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modeling import InputError
-from modeling.errors import shown
-from rig.live import memory as live_memory
-from rig.live.clock import now_s
-from rig.live.compiled import compiled
-from rig.live.memory import BLOCK, CONTACT, READING, Live
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.rig.live import memory as live_memory
+from tactileq.rig.live.clock import now_s
+from tactileq.rig.live.compiled import compiled
+from tactileq.rig.live.memory import BLOCK, CONTACT, READING, Live
 from tests.refusals import refused
 
 ROOT = Path(__file__).parents[3]
 RING = 16384
 WRITER = """
 import sys
-from rig.live.memory import Live
+from tactileq.rig.live.memory import Live
 live = Live.attach(sys.argv[1])
 for n in range(int(sys.argv[2])):
     live.write_reading(n, n, y_mm=n, speed_mm_s=n, force_n=n, flags=n % 32)
@@ -48,7 +48,7 @@ def test_rows_have_the_layout_of_the_header() -> None:
 
 
 def test_the_memory_of_a_killed_maker_goes_with_the_next_one() -> None:
-    making = "import sys\nfrom rig.live.memory import Live\nwith Live.create() as live: "
+    making = "import sys\nfrom tactileq.rig.live.memory import Live\nwith Live.create() as live: "
     told = [making + "print(live.path, flush=True); sys.stdin.read()"]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     with ExitStack() as stack:
@@ -169,12 +169,12 @@ def test_another_file_is_refused(tmp_path: Path, size: int | None) -> None:
 
 def test_the_clock_is_the_same_in_every_process() -> None:
     before = now_s()
-    command = [sys.executable, "-c", "from rig.live.clock import now_s; print(now_s())"]
+    command = [sys.executable, "-c", "from tactileq.rig.live.clock import now_s; print(now_s())"]
     there = float(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
     assert before < there < now_s()
 
 
 def test_without_compiled_parts_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rig.live.compiled._live", None)
+    monkeypatch.setattr("tactileq.rig.live.compiled._live", None)
     with refused(InputError, expected="compiled", got=["none", "C compiler"]):
         Live.create()

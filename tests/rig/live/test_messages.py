@@ -12,19 +12,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modeling import InputError
-from modeling.rendering.plan import RenderCounters
-from rig.capture.input import InputSettings
-from rig.desk import messages as pen
-from rig.force import messages  # noqa: F401
-from rig.force.settings import ForceSettings, Pose
-from rig.hand import messages as hand
-from rig.hand.settings import HandSettings
-from rig.live.messages import Message, Refused, decoded, received, send
-from rig.monitoring import bare_thread  # noqa: F401 (its messages)
-from rig.simulated import process  # noqa: F401
-from rig.simulated.vibrator import SimulatedTransducers
-from rig.sound import messages as sound
+from tactileq.modeling import InputError
+from tactileq.modeling.rendering.plan import RenderCounters
+from tactileq.rig.capture.input import InputSettings
+from tactileq.rig.desk import messages as pen
+from tactileq.rig.force import messages  # noqa: F401
+from tactileq.rig.force.settings import ForceSettings, Pose
+from tactileq.rig.hand import messages as hand
+from tactileq.rig.hand.settings import HandSettings
+from tactileq.rig.live.messages import Message, Refused, decoded, received, send
+from tactileq.rig.monitoring import bare_thread  # noqa: F401 (its messages)
+from tactileq.rig.simulated import process  # noqa: F401
+from tactileq.rig.simulated.vibrator import SimulatedTransducers
+from tactileq.rig.sound import messages as sound
 from tests.refusals import refused
 
 UNIONS = (sound.Request, hand.Report, pen.Request)

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from rig.live.child import Child
-from rig.live.memory import BLOCK, CONTACT, FORCE_ASSUMED, GONE, STALE, UNDERFLOW, Live, Rows
-from rig.live.messages import Done
-from rig.monitoring.bare_thread import BareThread, Look, WakeUps
-from rig.monitoring.figures import Monitor
+from tactileq.rig.live.child import Child
+from tactileq.rig.live.memory import BLOCK, CONTACT, FORCE_ASSUMED, GONE, STALE, UNDERFLOW, Live, Rows
+from tactileq.rig.live.messages import Done
+from tactileq.rig.monitoring.bare_thread import BareThread, Look, WakeUps
+from tactileq.rig.monitoring.figures import Monitor
 
 GRID = ((50.0, 350.0), (0.5, 3.5))
 
@@ -104,7 +104,7 @@ def test_a_thread_misses_what_it_sleeps_over() -> None:
 
 
 def test_the_bare_thread_answers_and_ends_with_its_input() -> None:
-    child = Child("rig.monitoring.bare_thread", 0.001)
+    child = Child("tactileq.rig.monitoring.bare_thread", 0.001)
     child.ready(Done)
     first = child.ask(Look(), WakeUps)
     assert first.periods >= first.misses >= 0

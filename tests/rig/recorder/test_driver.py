@@ -5,20 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modeling import InputError
-from modeling.arrays import Floats
-from rig.device.virtual import TICK_HZ
-from rig.recorder.driver import Recorder, RecordRefused, VirtualWire
-from rig.recorder.law import RecorderLaw, WantedRecord
-from rig.recorder.registers import (
+from tactileq.modeling import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.rig.device.virtual import TICK_HZ
+from tactileq.rig.recorder.driver import Recorder, RecordRefused, VirtualWire
+from tactileq.rig.recorder.law import RecorderLaw, WantedRecord
+from tactileq.rig.recorder.registers import (
     RecorderCause,
     RecorderCommand,
     RecorderSimulation,
     RecorderState,
     RecorderStatus,
 )
-from rig.wire.conversation import DeviceRefused
-from rig.wire.transports import TransportLost
+from tactileq.rig.wire.conversation import DeviceRefused
+from tactileq.rig.wire.transports import TransportLost
 
 MIDDLE = WantedRecord(speed_mm_s=200.0, force_n=2.0)
 HASTY = RecorderLaw(patience_s=1.5)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from modeling import InputError
-from rig.recorder.evaluation import HEADER, read_evaluation
+from tactileq.modeling import InputError
+from tactileq.rig.recorder.evaluation import HEADER, read_evaluation
 from tests.refusals import refused
 
 

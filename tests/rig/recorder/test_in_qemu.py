@@ -10,17 +10,17 @@ from typing import Any
 
 import pytest
 
-from rig.device.emulating import build_firmware
-from rig.device.virtual import TICK_HZ
-from rig.recorder.definition import RECORDER
-from rig.recorder.driver import DriverRecord, LinkedWire, Recorder, RecordRefused
-from rig.recorder.law import RecorderLaw, WantedRecord
-from rig.recorder.recording import REPEATED
-from rig.recorder.registers import RecorderCause, RecorderCommand, RecorderState
-from rig.wire.conversation import Conversation
-from rig.wire.definition import Value
-from rig.wire.link import Link
-from rig.wire.transports import opened_transport
+from tactileq.rig.device.emulating import build_firmware
+from tactileq.rig.device.virtual import TICK_HZ
+from tactileq.rig.recorder.definition import RECORDER
+from tactileq.rig.recorder.driver import DriverRecord, LinkedWire, Recorder, RecordRefused
+from tactileq.rig.recorder.law import RecorderLaw, WantedRecord
+from tactileq.rig.recorder.recording import REPEATED
+from tactileq.rig.recorder.registers import RecorderCause, RecorderCommand, RecorderState
+from tactileq.rig.wire.conversation import Conversation
+from tactileq.rig.wire.definition import Value
+from tactileq.rig.wire.link import Link
+from tactileq.rig.wire.transports import opened_transport
 from tests.rig.conftest import PATIENCE_S
 from tests.rig.device.killing import BAUD
 from tests.rig.device.test_in_qemu import (

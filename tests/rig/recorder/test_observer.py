@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.recorder.law import TICK_S
-from rig.recorder.virtual import compiled_recorder
+from tactileq.rig.recorder.law import TICK_S
+from tactileq.rig.recorder.virtual import compiled_recorder
 
 INERTIA, CONSTANT = 1.6e-5, 0.0273
 

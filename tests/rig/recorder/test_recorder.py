@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from modeling import InputError
-from rig.recorder.law import (
+from tactileq.modeling import InputError
+from tactileq.rig.recorder.law import (
     RecorderLaw,
     WantedRecord,
     check_conditions,
 )
-from rig.recorder.registers import RecorderCause
-from rig.recorder.virtual import RecorderParts, VirtualRecord, VirtualRecorder
+from tactileq.rig.recorder.registers import RecorderCause
+from tactileq.rig.recorder.virtual import RecorderParts, VirtualRecord, VirtualRecorder
 from tests.refusals import refused
 
 SPEEDS_MM_S = np.linspace(50.0, 350.0, 7)

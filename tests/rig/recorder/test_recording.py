@@ -16,25 +16,25 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from modeling import InputError, RecordingSet
-from modeling.arrays import Floats
-from modeling.files.tables import read_cells
-from rig.capture.grid import StrokeGrid
-from rig.capture.input import InputBlock
-from rig.capture.pieces import Plan
-from rig.device.virtual import TICK_HZ
-from rig.recorder.driver import Recorder, RecordRefused, VirtualWire
-from rig.recorder.law import RecorderLaw
-from rig.recorder.recording import SETTLES_S, PlanRun
-from rig.recorder.registers import RecorderCause, RecorderSimulation, RecorderState
-from rig.recorder.sensors import (
+from tactileq.modeling import InputError, RecordingSet
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.files.tables import read_cells
+from tactileq.rig.capture.grid import StrokeGrid
+from tactileq.rig.capture.input import InputBlock
+from tactileq.rig.capture.pieces import Plan
+from tactileq.rig.device.virtual import TICK_HZ
+from tactileq.rig.recorder.driver import Recorder, RecordRefused, VirtualWire
+from tactileq.rig.recorder.law import RecorderLaw
+from tactileq.rig.recorder.recording import SETTLES_S, PlanRun
+from tactileq.rig.recorder.registers import RecorderCause, RecorderSimulation, RecorderState
+from tactileq.rig.recorder.sensors import (
     SETTLED_S,
     DrawnVibration,
     EvaluationFiles,
     SensorRefused,
     SoundCardSensor,
 )
-from rig.recorder.store import PLAN_NAME, RECORDER_COLUMNS, TABLE_NAME, RecorderStore
+from tactileq.rig.recorder.store import PLAN_NAME, RECORDER_COLUMNS, TABLE_NAME, RecorderStore
 from tests.refusals import refused
 from tests.rig.recorder.test_evaluation import noise, written
 

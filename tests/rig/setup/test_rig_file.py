@@ -5,10 +5,10 @@ from datetime import date
 import numpy as np
 import pytest
 
-from modeling import InputError
-from modeling.files.described import keys_of
-from modeling.vibrators.vibrator import Vibrator
-from rig.setup.rig_file import SHIPPED_RIG_FILE, Curve, Figure, RigFile
+from tactileq.modeling import InputError
+from tactileq.modeling.files.described import keys_of
+from tactileq.modeling.vibrators.vibrator import Vibrator
+from tactileq.rig.setup.rig_file import SHIPPED_RIG_FILE, Curve, Figure, RigFile
 
 TABLET = SHIPPED_RIG_FILE.read_text(encoding="utf-8")
 

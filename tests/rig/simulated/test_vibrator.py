@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modeling import InputError, identify_vibrator
-from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
+from tactileq.modeling import InputError, identify_vibrator
+from tactileq.rig.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
 from tests.refusals import refused
 
 RATE_HZ = 8000.0

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sys
 
-from rig.live.clock import now_s, sleep, taking_part
-from rig.live.memory import CONTACT, Live
+from tactileq.rig.live.clock import now_s, sleep, taking_part
+from tactileq.rig.live.memory import CONTACT, Live
 
 live = Live.attach(sys.argv[1])
 with taking_part():

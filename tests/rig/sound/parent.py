@@ -11,10 +11,10 @@ import time
 
 import numpy as np
 
-from modeling.rendering.limits import Limits
-from rig.live.clock import readable
-from rig.live.memory import Live
-from rig.sound.output import SoundOutput
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.rig.live.clock import readable
+from tactileq.rig.live.memory import Live
+from tactileq.rig.sound.output import SoundOutput
 
 SIGNAL_G = np.ones(60 * 48000)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from modeling import InputError
-from rig.sound import devices
-from rig.sound.devices import SoundDevice, find_device
+from tactileq.modeling import InputError
+from tactileq.rig.sound import devices
+from tactileq.rig.sound.devices import SoundDevice, find_device
 from tests.refusals import refused
 
 

@@ -17,13 +17,13 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from modeling import InputError
-from modeling.rendering.limits import Limits
-from modeling.rendering.plan import RELEASE_S
-from rig.live.clock import now_s, sleep, taking_part
-from rig.live.memory import BLOCK, CONTACT, GONE, HEARTBEAT_S, NO_HEARTBEAT, STALE, Live
-from rig.sound.output import SoundOutput
-from rig.sound.supervision import SoundLost
+from tactileq.modeling import InputError
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.modeling.rendering.plan import RELEASE_S
+from tactileq.rig.live.clock import now_s, sleep, taking_part
+from tactileq.rig.live.memory import BLOCK, CONTACT, GONE, HEARTBEAT_S, NO_HEARTBEAT, STALE, Live
+from tactileq.rig.sound.output import SoundOutput
+from tactileq.rig.sound.supervision import SoundLost
 from tests.modeling.rendering.lattices import planted_ar
 from tests.refusals import refused
 from tests.rig.live.replay import Log, engine_of

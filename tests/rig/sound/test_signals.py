@@ -13,22 +13,22 @@ import soundfile
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modeling import InputError, TextureModel, Threshold, simplify
-from modeling.errors import shown
-from modeling.files.stimulus_table import STIMULUS_COLUMNS
-from modeling.files.tables import read_table
-from modeling.rendering.limits import Limits
-from modeling.rendering.plan import RenderPlan, plan_for
-from modeling.vibrators.compensation import compensation_for
-from rig.live.memory import Live
-from rig.sound.output import SoundOutput
-from rig.sound.signal_limits import check_signal, largest_factor
-from rig.sound.signals import stimuli_of_surfaces, stimulus, tone_burst
-from rig.sound.supervision import SoundLost
-from stimuli.planted.textures import planted_texture
-from stimuli.planted.vibrators import planted_vibrator
-from stimuli.sets.recipe import Recipe
-from stimuli.sets.writing import write_set
+from tactileq.modeling import InputError, TextureModel, Threshold, simplify
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.stimulus_table import STIMULUS_COLUMNS
+from tactileq.modeling.files.tables import read_table
+from tactileq.modeling.rendering.limits import Limits
+from tactileq.modeling.rendering.plan import RenderPlan, plan_for
+from tactileq.modeling.vibrators.compensation import compensation_for
+from tactileq.rig.live.memory import Live
+from tactileq.rig.sound.output import SoundOutput
+from tactileq.rig.sound.signal_limits import check_signal, largest_factor
+from tactileq.rig.sound.signals import stimuli_of_surfaces, stimulus, tone_burst
+from tactileq.rig.sound.supervision import SoundLost
+from tactileq.stimuli.planted.textures import planted_texture
+from tactileq.stimuli.planted.vibrators import planted_vibrator
+from tactileq.stimuli.sets.recipe import Recipe
+from tactileq.stimuli.sets.writing import write_set
 from tests.refusals import refused
 
 RATE_HZ = 48000.0

@@ -13,12 +13,12 @@ from contextlib import contextmanager, suppress
 
 import pytest
 
-from modeling import InputError
-from rig.device.definition import DEVICE
-from rig.device.virtual import VirtualTransport
-from rig.wire.conversation import Conversation
-from rig.wire.envelope import REPLY, WireFrame, WireReader
-from rig.wire.transports import SerialTransport, SocketTransport, TransportLost
+from tactileq.modeling import InputError
+from tactileq.rig.device.definition import DEVICE
+from tactileq.rig.device.virtual import VirtualTransport
+from tactileq.rig.wire.conversation import Conversation
+from tactileq.rig.wire.envelope import REPLY, WireFrame, WireReader
+from tactileq.rig.wire.transports import SerialTransport, SocketTransport, TransportLost
 from tests.refusals import refused
 
 
@@ -135,7 +135,7 @@ def hello_of(who: int, version: int, schema: int) -> Callable[[bytes], bytes]:
 def test_another_device_at_the_port_is_refused(
     answer: Callable[[bytes], bytes], facts: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rig.wire.conversation.HELLO_S", 0.5)
+    monkeypatch.setattr("tactileq.rig.wire.conversation.HELLO_S", 0.5)
     with answering(answer) as path:
         port = SerialTransport(path, 115_200)
         try:

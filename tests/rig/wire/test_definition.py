@@ -11,9 +11,9 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modeling import InputError
-from rig.device.definition import DEVICE
-from rig.wire.definition import Definition
+from tactileq.modeling import InputError
+from tactileq.rig.device.definition import DEVICE
+from tactileq.rig.wire.definition import Definition
 from tests.refusals import refused
 
 FILE = Path(__file__).parents[3] / "rig/device/device.yml"

@@ -9,8 +9,8 @@ from cobs import cobs
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modeling import InputError
-from rig.wire.envelope import LONGEST, Kind, WireFrame, WireReader
+from tactileq.modeling import InputError
+from tactileq.rig.wire.envelope import LONGEST, Kind, WireFrame, WireReader
 from tests.refusals import refused
 
 FRAMES = st.builds(

@@ -13,16 +13,16 @@ from pathlib import Path
 
 import pytest
 
-from modeling import InputError
-from rig.device.definition import DEVICE
-from rig.device.emulating import Emulator
-from rig.device.models import device_model
-from rig.device.registers import DeviceCause, DeviceCommand, DeviceState
-from rig.live.clock import now_s, sleep, taking_part
-from rig.wire.conversation import Block
-from rig.wire.link import Link, _Command
-from rig.wire.transports import Transport, opened_transport
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import InputError
+from tactileq.rig.device.definition import DEVICE
+from tactileq.rig.device.emulating import Emulator
+from tactileq.rig.device.models import device_model
+from tactileq.rig.device.registers import DeviceCause, DeviceCommand, DeviceState
+from tactileq.rig.live.clock import now_s, sleep, taking_part
+from tactileq.rig.wire.conversation import Block
+from tactileq.rig.wire.link import Link, _Command
+from tactileq.rig.wire.transports import Transport, opened_transport
+from tactileq.stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 from tests.rig.waiting import follow
 

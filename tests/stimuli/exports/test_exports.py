@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from scipy.io import wavfile
 from scipy.signal import freqz, lfilter
 
-from modeling import (
+from tactileq.modeling import (
     ARModel,
     InputError,
     Limits,
@@ -27,15 +27,15 @@ from modeling import (
     compensation_for,
     regressed,
 )
-from modeling.engines import SWITCH
-from modeling.errors import shown
-from stimuli.exports.c_header import c_identifier, write_c_header
-from stimuli.exports.peq_json import write_peq_json
-from stimuli.exports.wav import write_wav
-from stimuli.planted.textures import planted_texture
-from stimuli.planted.vibrators import planted_vibrator
-from stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
-from stimuli.sets.writing import write_set
+from tactileq.modeling.engines import SWITCH
+from tactileq.modeling.errors import shown
+from tactileq.stimuli.exports.c_header import c_identifier, write_c_header
+from tactileq.stimuli.exports.peq_json import write_peq_json
+from tactileq.stimuli.exports.wav import write_wav
+from tactileq.stimuli.planted.textures import planted_texture
+from tactileq.stimuli.planted.vibrators import planted_vibrator
+from tactileq.stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
+from tactileq.stimuli.sets.writing import write_set
 from tests.refusals import refused
 
 ROOT = Path(__file__).parents[3]

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modeling import Limits, Renderer
-from stimuli.exports.c_header import write_c_header
-from stimuli.planted.textures import planted_texture
+from tactileq.modeling import Limits, Renderer
+from tactileq.stimuli.exports.c_header import write_c_header
+from tactileq.stimuli.planted.textures import planted_texture
 
 ROOT = Path(__file__).parents[3]
 SOURCE = ROOT / "docs/micro-controller"

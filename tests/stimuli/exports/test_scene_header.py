@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from modeling import (
+from tactileq.modeling import (
     InputError,
     Limits,
     RegressedModel,
@@ -25,12 +25,12 @@ from modeling import (
     compensation_for,
     regressed,
 )
-from modeling.rendering.plan import RenderPlan, plan_for
-from modeling.rendering.reference.compensator import Compensator
-from modeling.rendering.reference.limiter import Limiter
-from stimuli.exports.scene_header import scene_header, scene_identifier
-from stimuli.planted.textures import planted_texture
-from stimuli.planted.vibrators import planted_vibrator
+from tactileq.modeling.rendering.plan import RenderPlan, plan_for
+from tactileq.modeling.rendering.reference.compensator import Compensator
+from tactileq.modeling.rendering.reference.limiter import Limiter
+from tactileq.stimuli.exports.scene_header import scene_header, scene_identifier
+from tactileq.stimuli.planted.textures import planted_texture
+from tactileq.stimuli.planted.vibrators import planted_vibrator
 from tests.refusals import refused
 
 SEED = 7

@@ -11,15 +11,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import stimuli.planted
-from analysis.textures.between import halfway, truth_summary
-from modeling import InputError, fit_ar, fit_texture
-from modeling.recordings.spectrum import spectrum
-from stimuli.planted.drawn import FORCES_N, RATE_HZ, SPEEDS_MM_S, alter_surface, draw_surface
+import tactileq.stimuli.planted
+from tactileq.analysis.textures.between import halfway, truth_summary
+from tactileq.modeling import InputError, fit_ar, fit_texture
+from tactileq.modeling.recordings.spectrum import spectrum
+from tactileq.stimuli.planted.drawn import FORCES_N, RATE_HZ, SPEEDS_MM_S, alter_surface, draw_surface
 from tests.refusals import refused
 
 FREQUENCY_HZ = np.arange(15.0, 481.0)
-TABLES = Path(stimuli.planted.__file__).parent / "spectral_statistics"
+TABLES = Path(tactileq.stimuli.planted.__file__).parent / "spectral_statistics"
 
 
 def table(name: str) -> tuple[list[str], np.ndarray]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modeling import PEQ
-from stimuli.planted.spectra import KINDS, RATE_HZ, RandomTruth, TruthKind, random_truth
+from tactileq.modeling import PEQ
+from tactileq.stimuli.planted.spectra import KINDS, RATE_HZ, RandomTruth, TruthKind, random_truth
 
 LAYERS = PEQ(
     noise_gain=0.02,

@@ -9,9 +9,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from modeling import InputError, TextureModel, fit_texture, similarity, spectrum
-from modeling.recordings.spectrum import Spectrum, smooth
-from stimuli.planted.textures import (
+from tactileq.modeling import InputError, TextureModel, fit_texture, similarity, spectrum
+from tactileq.modeling.recordings.spectrum import Spectrum, smooth
+from tactileq.stimuli.planted.textures import (
     CATALOGUE,
     RECORDER_RATE_HZ,
     TEXTURES,

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modeling import InputError
-from stimuli.planted.vibrators import SimulatedVibrator
+from tactileq.modeling import InputError
+from tactileq.stimuli.planted.vibrators import SimulatedVibrator
 from tests.refusals import refused
 
 

@@ -14,11 +14,11 @@ import pytest
 import soundfile
 from scipy.signal import iirpeak, lfilter
 
-from modeling import InputError, TextureModel, Threshold, Vibrator
-from stimuli.exports.peq_json import write_peq_json
-from stimuli.sets.recipe import ModelEntry, Recipe, SetLevel
-from stimuli.sets.sources import load_sources
-from stimuli.sets.writing import write_set
+from tactileq.modeling import InputError, TextureModel, Threshold, Vibrator
+from tactileq.stimuli.exports.peq_json import write_peq_json
+from tactileq.stimuli.sets.recipe import ModelEntry, Recipe, SetLevel
+from tactileq.stimuli.sets.sources import load_sources
+from tactileq.stimuli.sets.writing import write_set
 from tests.refusals import refused
 
 MakeRecipe = Callable[..., Recipe]

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from modeling import InputError, Vibrator
-from stimuli.planted.textures import planted_texture
-from stimuli.sets.recipe import ModelEntry, Recipe, SetLevel, TrajectoryEntry
-from stimuli.sets.sources import load_sources
+from tactileq.modeling import InputError, Vibrator
+from tactileq.stimuli.planted.textures import planted_texture
+from tactileq.stimuli.sets.recipe import ModelEntry, Recipe, SetLevel, TrajectoryEntry
+from tactileq.stimuli.sets.sources import load_sources
 from tests.refusals import refused
 
 ROOT = Path(__file__).parents[3]

@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 from scipy.io import wavfile
 from scipy.signal import firwin, iirpeak, lfilter, resample
 
-from modeling import Compensation, Renderer, TextureModel, fit_ar, regressed
-from modeling.models.loading import AnyModel
-from modeling.recordings.trajectory import Trajectory
-from stimuli.planted.textures import planted_texture, record_texture
-from stimuli.sets.recipe import TrajectoryEntry
-from stimuli.sets.rendering import (
+from tactileq.modeling import Compensation, Renderer, TextureModel, fit_ar, regressed
+from tactileq.modeling.models.loading import AnyModel
+from tactileq.modeling.recordings.trajectory import Trajectory
+from tactileq.stimuli.planted.textures import planted_texture, record_texture
+from tactileq.stimuli.sets.recipe import TrajectoryEntry
+from tactileq.stimuli.sets.rendering import (
     at_rate,
     fade_samples,
     highest_peak,
@@ -28,7 +28,7 @@ from stimuli.sets.rendering import (
     steady_part,
     wav_bytes,
 )
-from stimuli.sets.sources import trajectory_of
+from tactileq.stimuli.sets.sources import trajectory_of
 
 SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
 RATES_HZ = (5000, 44_100, 48_000)

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modeling import InputError, Scene, compile_scene
-from modeling.models.loading import load_model
-from modeling.scenes.loading import scene_models
-from stimuli.planted.textures import planted_texture
-from stimuli.sets.recipe import Recipe
-from stimuli.sets.sources import files_behind, load_sources
-from stimuli.sets.writing import write_set
+from tactileq.modeling import InputError, Scene, compile_scene
+from tactileq.modeling.models.loading import load_model
+from tactileq.modeling.scenes.loading import scene_models
+from tactileq.stimuli.planted.textures import planted_texture
+from tactileq.stimuli.sets.recipe import Recipe
+from tactileq.stimuli.sets.sources import files_behind, load_sources
+from tactileq.stimuli.sets.writing import write_set
 from tests.refusals import refused
 
 SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stimuli.sets.recipe import TrajectoryEntry
-from stimuli.sets.sources import trajectory_of
+from tactileq.stimuli.sets.recipe import TrajectoryEntry
+from tactileq.stimuli.sets.sources import trajectory_of
 
 
 def test_a_constant_entry_is_held() -> None:

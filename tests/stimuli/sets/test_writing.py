@@ -19,15 +19,15 @@ import numpy as np
 import pytest
 import soundfile
 
-from modeling import InputError, TextureModel, Threshold, fit_ar, regressed
-from modeling.files.stimulus_table import STIMULUS_COLUMNS
-from modeling.perception.sensation_level import sensation_level
-from stimuli.planted.textures import planted_texture, record_texture
-from stimuli.sets import writing
-from stimuli.sets.manifest import StimulusRow
-from stimuli.sets.recipe import ModelEntry, Recipe, SetLevel, TrajectoryEntry
-from stimuli.sets.rendering import fade_samples
-from stimuli.sets.writing import write_set
+from tactileq.modeling import InputError, TextureModel, Threshold, fit_ar, regressed
+from tactileq.modeling.files.stimulus_table import STIMULUS_COLUMNS
+from tactileq.modeling.perception.sensation_level import sensation_level
+from tactileq.stimuli.planted.textures import planted_texture, record_texture
+from tactileq.stimuli.sets import writing
+from tactileq.stimuli.sets.manifest import StimulusRow
+from tactileq.stimuli.sets.recipe import ModelEntry, Recipe, SetLevel, TrajectoryEntry
+from tactileq.stimuli.sets.rendering import fade_samples
+from tactileq.stimuli.sets.writing import write_set
 from tests.refusals import refused
 
 SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
@@ -146,7 +146,7 @@ def test_set_is_reproducible_to_the_bit_from_its_own_recipe(
     write_set(tmp_path / "c", Recipe.load(tmp_path / "moved/recipe.toml"))
     assert contents(tmp_path / "c") == first
     program = (
-        "from stimuli.sets.recipe import Recipe\nfrom stimuli.sets.writing import write_set\n"
+        "from tactileq.stimuli.sets.recipe import Recipe\nfrom tactileq.stimuli.sets.writing import write_set\n"
         "write_set('d', Recipe.load('moved/recipe.toml'))\n"
     )
     subprocess.run([sys.executable, "-c", program], cwd=tmp_path, check=True)

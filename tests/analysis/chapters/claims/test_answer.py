@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.answers.plan import AnalysisPlan
-from analysis.answers.responses import PlannedTask, Responses
-from analysis.chapters.claims.answer import answer, unfinished_tasks
-from analysis.chapters.claims.plan_sentences import deviations, methods_paragraph
-from analysis.chapters.claims.sentences import claim_outcomes, difference, overall_row
-from analysis.labels import ALL_TEXTURES
-from analysis.page.outcomes import Outcome, Weight
-from analysis.page.sections import Section
-from analysis.statistics.claims import CONTROL
-from analysis.statistics.verdicts import ClaimFound, claims_found
+from tactileq.analysis.answers.plan import AnalysisPlan
+from tactileq.analysis.answers.responses import PlannedTask, Responses
+from tactileq.analysis.chapters.claims.answer import answer, unfinished_tasks
+from tactileq.analysis.chapters.claims.plan_sentences import deviations, methods_paragraph
+from tactileq.analysis.chapters.claims.sentences import claim_outcomes, difference, overall_row
+from tactileq.analysis.labels import ALL_TEXTURES
+from tactileq.analysis.page.outcomes import Outcome, Weight
+from tactileq.analysis.page.sections import Section
+from tactileq.analysis.statistics.claims import CONTROL
+from tactileq.analysis.statistics.verdicts import ClaimFound, claims_found
 from tests.analysis.conftest import words_of
 
 pytestmark = pytest.mark.usefixtures("few_draws")

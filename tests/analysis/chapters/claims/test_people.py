@@ -8,19 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.answers.plan import MODEL_RULE
-from analysis.answers.responses import PlannedTask, Responses
-from analysis.chapters.claims.answer import answer
-from analysis.chapters.claims.model_sentences import decided_by_tests
-from analysis.chapters.claims.people import DOUBLED, OWN, people_items, people_table, priors_table
-from analysis.chapters.claims.people_sentences import FEEL_IT, about, headline
-from analysis.chapters.claims.plan_sentences import deviations, methods_paragraph
-from analysis.chapters.claims.section import sections
-from analysis.chapters.claims.sentences import claim_outcomes, overall_row
-from analysis.page.outcomes import Weight
-from analysis.report.report import write_report
-from analysis.statistics.caveats import INTERIM, WITHHELD
-from analysis.statistics.equivalence import (
+from tactileq.analysis.answers.plan import MODEL_RULE
+from tactileq.analysis.answers.responses import PlannedTask, Responses
+from tactileq.analysis.chapters.claims.answer import answer
+from tactileq.analysis.chapters.claims.model_sentences import decided_by_tests
+from tactileq.analysis.chapters.claims.people import DOUBLED, OWN, people_items, people_table, priors_table
+from tactileq.analysis.chapters.claims.people_sentences import FEEL_IT, about, headline
+from tactileq.analysis.chapters.claims.plan_sentences import deviations, methods_paragraph
+from tactileq.analysis.chapters.claims.section import sections
+from tactileq.analysis.chapters.claims.sentences import claim_outcomes, overall_row
+from tactileq.analysis.page.outcomes import Weight
+from tactileq.analysis.report.report import write_report
+from tactileq.analysis.statistics.caveats import INTERIM, WITHHELD
+from tactileq.analysis.statistics.equivalence import (
     ALL_BUT,
     AVERAGE_FELT,
     DIFFERENT,
@@ -30,12 +30,12 @@ from analysis.statistics.equivalence import (
     INCONCLUSIVE,
     WITHIN_BOUNDS,
 )
-from analysis.statistics.participants.posterior import Effort
-from analysis.statistics.participants.verdict import DOUBLED_CHAINS, PeopleSummary
-from analysis.statistics.verdicts import ClaimFound, claims_found
-from modeling.files.writing import file_stem
-from modeling.participants.choices import ODDITY, ChoicePriors, forced_choice
-from modeling.participants.ratings import RatingPriors
+from tactileq.analysis.statistics.participants.posterior import Effort
+from tactileq.analysis.statistics.participants.verdict import DOUBLED_CHAINS, PeopleSummary
+from tactileq.analysis.statistics.verdicts import ClaimFound, claims_found
+from tactileq.modeling.files.writing import file_stem
+from tactileq.modeling.participants.choices import ODDITY, ChoicePriors, forced_choice
+from tactileq.modeling.participants.ratings import RatingPriors
 from tests.analysis.conftest import answered_of, by_model, people_summary, rating_table, words_of
 from tests.analysis.conftest import people_table as people
 
@@ -308,7 +308,7 @@ def test_a_report_by_the_model_says_what_feeling_it_means(
 ):
     """The whole way, with short chains: eight people, of whom none feels a difference."""
     short = Effort(chains=2, warm_up=20, steps=40, every=4)
-    monkeypatch.setattr("analysis.statistics.participants.verdict.Effort", lambda: short)
+    monkeypatch.setattr("tactileq.analysis.statistics.participants.verdict.Effort", lambda: short)
     few = rating_table(np.random.default_rng(3), people=8).assign(session=1)
     few["trial"] = few.groupby("participant_id").cumcount() + 1
     of_few = anchors["absolute"].assign(session=1, trial=99)

@@ -11,17 +11,17 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from analysis.chapters.claims.forest import BESIDE, MARKS, figure_forest, plot_forest
-from analysis.chapters.claims.people_figure import (
+from tactileq.analysis.chapters.claims.forest import BESIDE, MARKS, figure_forest, plot_forest
+from tactileq.analysis.chapters.claims.people_figure import (
     CARELESS,
     INSIDE,
     OUTSIDE,
     figure_people,
     plot_people,
 )
-from analysis.statistics.caveats import EQUALITY
-from analysis.statistics.equivalence import EQUAL_ON_AVERAGE, FELT
-from analysis.statistics.verdicts import ClaimFound
+from tactileq.analysis.statistics.caveats import EQUALITY
+from tactileq.analysis.statistics.equivalence import EQUAL_ON_AVERAGE, FELT
+from tactileq.analysis.statistics.verdicts import ClaimFound
 from tests.analysis.conftest import by_model, people_summary, people_table
 
 SUMMARY = people_summary(mean=(5.0, -1.0, 9.0), share=(0.42, 0.25, 0.58), most=0.55, somebody=1.0)

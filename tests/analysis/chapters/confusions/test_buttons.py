@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.chapters.confusions import buttons
-from analysis.chapters.confusions.buttons import BUTTON_COLUMNS, button_preference
-from modeling.files.columns import names
+from tactileq.analysis.chapters.confusions import buttons
+from tactileq.analysis.chapters.confusions.buttons import BUTTON_COLUMNS, button_preference
+from tactileq.modeling.files.columns import names
 
 TEXTURES = [f"t{n}" for n in range(7)]
 

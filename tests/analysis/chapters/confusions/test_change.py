@@ -3,8 +3,8 @@
 import numpy as np
 from scipy import stats
 
-from analysis.chapters.confusions.change import confusion_change_p
-from modeling import InputError
+from tactileq.analysis.chapters.confusions.change import confusion_change_p
+from tactileq.modeling import InputError
 from tests.refusals import refused
 
 SHARES = np.array([[0.6, 0.3, 0.1], [0.2, 0.6, 0.2], [0.1, 0.3, 0.6]])

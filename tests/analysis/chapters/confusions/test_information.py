@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from analysis.chapters.confusions.information import (
+from tactileq.analysis.chapters.confusions.information import (
     corrected_bits,
     information_bits,
     transferred_information,
 )
-from modeling import InputError
+from tactileq.modeling import InputError
 from tests.refusals import refused
 
 

@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.chapters.chapter import Stream
-from analysis.chapters.confusions.section import confusion_section
-from analysis.page.page import Fold, Table
-from analysis.page.sections import Section
-from analysis.statistics.confusion import confusion_matrices, participant_counts
+from tactileq.analysis.chapters.chapter import Stream
+from tactileq.analysis.chapters.confusions.section import confusion_section
+from tactileq.analysis.page.page import Fold, Table
+from tactileq.analysis.page.sections import Section
+from tactileq.analysis.statistics.confusion import confusion_matrices, participant_counts
 
 pytestmark = pytest.mark.usefixtures("few_draws")
 

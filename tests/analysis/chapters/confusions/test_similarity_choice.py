@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy import stats
 
-from analysis.chapters.confusions.similarity_choice import similarity_choice
-from modeling import InputError
+from tactileq.analysis.chapters.confusions.similarity_choice import similarity_choice
+from tactileq.modeling import InputError
 from tests.refusals import refused
 
 

@@ -8,9 +8,9 @@ import pytest
 from matplotlib.colors import to_hex
 from scipy import stats
 
-from analysis.chapters.hand.figure import figure_hand, plot_measure
-from analysis.page.drawing import GREY
-from analysis.page.saving import png_of
+from tactileq.analysis.chapters.hand.figure import figure_hand, plot_measure
+from tactileq.analysis.page.drawing import GREY
+from tactileq.analysis.page.saving import png_of
 
 pytestmark = pytest.mark.filterwarnings("error")
 PAIR = ("full", "simplified")

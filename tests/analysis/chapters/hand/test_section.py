@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.chapters.hand.section import hand_section
-from analysis.page.page import Fold, Table, table_html
-from analysis.page.sections import Section
-from modeling.files.columns import names
+from tactileq.analysis.chapters.hand.section import hand_section
+from tactileq.analysis.page.page import Fold, Table, table_html
+from tactileq.analysis.page.sections import Section
+from tactileq.modeling.files.columns import names
 
 pytestmark = pytest.mark.filterwarnings("error")
 PAIR = ("full", "simplified")

@@ -7,15 +7,15 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.answers.hand import HAND_MEASURES
-from analysis.chapters.hand.statistics import (
+from tactileq.analysis.answers.hand import HAND_MEASURES
+from tactileq.analysis.chapters.hand.statistics import (
     HAND_PARTICIPANT_COLUMNS,
     HAND_TEST_COLUMNS,
     hand_by_participant,
     hand_means,
     hand_tests,
 )
-from modeling.files.columns import names
+from tactileq.modeling.files.columns import names
 
 pytestmark = pytest.mark.filterwarnings("error")
 PAIR = ("full", "other")

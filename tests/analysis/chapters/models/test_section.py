@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from analysis.chapters.models.section import left_out_outcomes
+from tactileq.analysis.chapters.models.section import left_out_outcomes
 
 
 def test_the_worst_prediction_is_the_furthest_off_to_either_side() -> None:

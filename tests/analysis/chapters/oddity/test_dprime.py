@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import norm
 
-from analysis.chapters.oddity.dprime import (
+from tactileq.analysis.chapters.oddity.dprime import (
     d_primes,
     m_afc_d_prime,
     oddity_d_prime,
     same_different_d_prime,
     same_different_differencing_d_prime,
 )
-from modeling import InputError
-from modeling.participants.choices import m_afc_share, oddity_share
+from tactileq.modeling import InputError
+from tactileq.modeling.participants.choices import m_afc_share, oddity_share
 from tests.refusals import refused
 
 

@@ -10,24 +10,24 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
-from analysis.answers.plan import AnalysisPlan
-from analysis.answers.responses import Responses
-from analysis.chapters.oddity.dprime import oddity_d_prime
-from analysis.chapters.oddity.section import (
+from tactileq.analysis.answers.plan import AnalysisPlan
+from tactileq.analysis.answers.responses import Responses
+from tactileq.analysis.chapters.oddity.dprime import oddity_d_prime
+from tactileq.analysis.chapters.oddity.section import (
     ODDITY_COLUMNS,
     oddity_section,
     oddity_sensitivity,
     sections,
 )
-from analysis.labels import ALL_TEXTURES, TASK_TITLES
-from analysis.page.page import Table, table_html
-from analysis.statistics.caveats import WITHHELD, Caveats
-from analysis.statistics.claims import Values, claim_tests
-from analysis.statistics.equivalence import DIFFERENT
-from analysis.statistics.verdicts import ClaimFound
-from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.columns import names
-from modeling.participants.choices import oddity_share
+from tactileq.analysis.labels import ALL_TEXTURES, TASK_TITLES
+from tactileq.analysis.page.page import Table, table_html
+from tactileq.analysis.statistics.caveats import WITHHELD, Caveats
+from tactileq.analysis.statistics.claims import Values, claim_tests
+from tactileq.analysis.statistics.equivalence import DIFFERENT
+from tactileq.analysis.statistics.verdicts import ClaimFound
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.files.columns import names
+from tactileq.modeling.participants.choices import oddity_share
 from tests.analysis.conftest import answered_of
 
 pytestmark = pytest.mark.filterwarnings("error")

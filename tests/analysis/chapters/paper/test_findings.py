@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from analysis.chapters.paper.findings import (
+from tactileq.analysis.chapters.paper.findings import (
     CONTRADICTED,
     NOT_COMPARABLE,
     OPEN,
@@ -24,9 +24,9 @@ from analysis.chapters.paper.findings import (
     of_answers,
     of_models,
 )
-from analysis.chapters.paper.section import paper_section, sections
-from analysis.page.page import Table
-from analysis.statistics.verdicts import ClaimFound
+from tactileq.analysis.chapters.paper.section import paper_section, sections
+from tactileq.analysis.page.page import Table
+from tactileq.analysis.statistics.verdicts import ClaimFound
 
 numbers = st.integers(-10, 10)
 

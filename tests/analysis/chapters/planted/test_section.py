@@ -6,8 +6,8 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.chapters.planted.section import planted_outcomes
-from analysis.textures.recovery import ALL_LAYERS
+from tactileq.analysis.chapters.planted.section import planted_outcomes
+from tactileq.analysis.textures.recovery import ALL_LAYERS
 
 
 def recovered(texture: str, *, error_hz: float, ratio: float, error_db: float) -> dict[str, Any]:

@@ -6,14 +6,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.chapters.reliability.section import (
+from tactileq.analysis.chapters.reliability.section import (
     CARELESS_COLUMNS,
     careless_signs,
     reliability_section,
 )
-from analysis.page.page import Table, table_html
-from analysis.page.sections import Section
-from modeling.files.columns import names
+from tactileq.analysis.page.page import Table, table_html
+from tactileq.analysis.page.sections import Section
+from tactileq.modeling.files.columns import names
 
 pytestmark = pytest.mark.filterwarnings("error")
 CHANCES = {"relative": 1 / 3}

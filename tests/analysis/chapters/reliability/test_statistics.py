@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.chapters.reliability.statistics import (
+from tactileq.analysis.chapters.reliability.statistics import (
     AGREEMENT_COLUMNS,
     RATER_COLUMNS,
     SIGN_COLUMNS,
@@ -19,7 +19,7 @@ from analysis.chapters.reliability.statistics import (
     same_ratings,
     within_participant_sd,
 )
-from modeling.files.columns import names
+from tactileq.modeling.files.columns import names
 
 pytestmark = pytest.mark.filterwarnings("error")
 SCALE = "magnitude_similarity"

@@ -8,10 +8,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import special, stats
 
-from analysis.chapters.single_answers.gee import GEE, GEE_COLUMNS, SIGN_FLIPS, fit_gee, gee_effects
-from analysis.labels import ALL_TEXTURES
-from analysis.statistics.design import design
-from modeling.files.columns import names
+from tactileq.analysis.chapters.single_answers.gee import GEE, GEE_COLUMNS, SIGN_FLIPS, fit_gee, gee_effects
+from tactileq.analysis.labels import ALL_TEXTURES
+from tactileq.analysis.statistics.design import design
+from tactileq.modeling.files.columns import names
 
 MODELS = ("full", "simplified")
 pytestmark = pytest.mark.filterwarnings("error")

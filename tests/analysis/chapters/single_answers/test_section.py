@@ -8,13 +8,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.answers.plan import AnalysisPlan
-from analysis.answers.responses import Responses
-from analysis.chapters.single_answers.gee import SIGN_FLIPS
-from analysis.chapters.single_answers.section import mixed_section
-from analysis.page.page import Table, table_html
-from analysis.page.sections import Section
-from analysis.statistics.verdicts import claims_found
+from tactileq.analysis.answers.plan import AnalysisPlan
+from tactileq.analysis.answers.responses import Responses
+from tactileq.analysis.chapters.single_answers.gee import SIGN_FLIPS
+from tactileq.analysis.chapters.single_answers.section import mixed_section
+from tactileq.analysis.page.page import Table, table_html
+from tactileq.analysis.page.sections import Section
+from tactileq.analysis.statistics.verdicts import claims_found
 from tests.analysis.conftest import choice_table, rating_table
 
 pytestmark = pytest.mark.usefixtures("few_draws")

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy import stats
 
-from analysis.chapters.speed.comparison import (
+from tactileq.analysis.chapters.speed.comparison import (
     RIGHT_WRONG_COLUMNS,
     SPEED_COMPARISON_COLUMNS,
     SPEED_MEASURES,
@@ -21,7 +21,7 @@ from analysis.chapters.speed.comparison import (
     right_and_wrong,
     time_ratios,
 )
-from analysis.chapters.speed.scores import (
+from tactileq.analysis.chapters.speed.scores import (
     CONDITIONAL_COLUMNS,
     MEAN_COLUMNS,
     SCORE_COLUMNS,
@@ -32,10 +32,10 @@ from analysis.chapters.speed.scores import (
     score_means,
     speed_and_accuracy,
 )
-from analysis.chapters.speed.section import trade_off_sentence
-from analysis.statistics.mixed import MIXED_MODEL, PAIRED
-from modeling import InputError
-from modeling.files.columns import names
+from tactileq.analysis.chapters.speed.section import trade_off_sentence
+from tactileq.analysis.statistics.mixed import MIXED_MODEL, PAIRED
+from tactileq.modeling import InputError
+from tactileq.modeling.files.columns import names
 from tests.refusals import refused
 
 MODELS = ("full", "simplified")

@@ -6,13 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.chapters.chapter import Stream
-from analysis.chapters.speed.section import applies, speed_accuracy_section
-from analysis.page.outcomes import Weight
-from analysis.page.page import Fold, Picture, Table, table_html
-from analysis.page.sections import Section
-from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.columns import names
+from tactileq.analysis.chapters.chapter import Stream
+from tactileq.analysis.chapters.speed.section import applies, speed_accuracy_section
+from tactileq.analysis.page.outcomes import Weight
+from tactileq.analysis.page.page import Fold, Picture, Table, table_html
+from tactileq.analysis.page.sections import Section
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.files.columns import names
 
 MODELS = ("full", "simplified")
 pytestmark = pytest.mark.filterwarnings("error")

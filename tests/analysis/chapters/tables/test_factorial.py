@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.chapters.tables.factorial import (
+from tactileq.analysis.chapters.tables.factorial import (
     _few_factors,
     _many_factors,
     cell_means,
@@ -17,7 +17,7 @@ from analysis.chapters.tables.factorial import (
     participant_cells,
     repeated_measures_anova,
 )
-from modeling import InputError
+from tactileq.modeling import InputError
 from tests.refusals import refused
 
 

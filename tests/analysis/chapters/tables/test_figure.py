@@ -5,8 +5,8 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from analysis.chapters.tables.factorial import cell_means, participant_cells
-from analysis.chapters.tables.figure import figure_factorial
+from tactileq.analysis.chapters.tables.factorial import cell_means, participant_cells
+from tactileq.analysis.chapters.tables.figure import figure_factorial
 
 
 @pytest.mark.parametrize("simulated", [True, False])

@@ -12,22 +12,22 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.answers.plan import AnalysisPlan, Claim
-from analysis.answers.responses import PlannedTask, Responses
-from analysis.chapters.choices import section as choices_chapter
-from analysis.chapters.choices.figure import figure_correct_rates
-from analysis.chapters.claims.answer import NOTHING_TO_CLAIM, answer
-from analysis.chapters.claims.plan_sentences import methods_paragraph
-from analysis.chapters.oddity import section as oddity_chapter
-from analysis.chapters.ratings import section as ratings_chapter
-from analysis.chapters.tasks import section as tasks_chapter
-from analysis.labels import ALL_TEXTURES, TASK_TITLES
-from analysis.page.sections import Headline, Section
-from analysis.report.report import write_report
-from analysis.statistics.compared_answers import chance_of
-from analysis.statistics.rates import UNKNOWN_CHANCE
-from analysis.statistics.verdicts import ClaimFound, claims_found
-from modeling.files.answer_tables import (
+from tactileq.analysis.answers.plan import AnalysisPlan, Claim
+from tactileq.analysis.answers.responses import PlannedTask, Responses
+from tactileq.analysis.chapters.choices import section as choices_chapter
+from tactileq.analysis.chapters.choices.figure import figure_correct_rates
+from tactileq.analysis.chapters.claims.answer import NOTHING_TO_CLAIM, answer
+from tactileq.analysis.chapters.claims.plan_sentences import methods_paragraph
+from tactileq.analysis.chapters.oddity import section as oddity_chapter
+from tactileq.analysis.chapters.ratings import section as ratings_chapter
+from tactileq.analysis.chapters.tasks import section as tasks_chapter
+from tactileq.analysis.labels import ALL_TEXTURES, TASK_TITLES
+from tactileq.analysis.page.sections import Headline, Section
+from tactileq.analysis.report.report import write_report
+from tactileq.analysis.statistics.compared_answers import chance_of
+from tactileq.analysis.statistics.rates import UNKNOWN_CHANCE
+from tactileq.analysis.statistics.verdicts import ClaimFound, claims_found
+from tactileq.modeling.files.answer_tables import (
     ANSWER_TABLES,
     CORRECT,
     ENDS,

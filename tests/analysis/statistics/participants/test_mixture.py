@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.statistics.participants.mixture import MixtureOfEffects
-from modeling.participants.effects import EffectPriors
+from tactileq.analysis.statistics.participants.mixture import MixtureOfEffects
+from tactileq.modeling.participants.effects import EffectPriors
 
 
 def test_people_without_answers_are_placed_by_the_weights_of_the_same_draw() -> None:

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.statistics.participants.design import (
+from tactileq.analysis.statistics.participants.design import (
     choice_studies,
     first_people,
     rating_studies,
 )
-from analysis.statistics.participants.mixture import MixtureOfEffects, vague_mean
-from analysis.statistics.participants.posterior import Draws, Effort, choice_draws, rating_draws
-from analysis.statistics.participants.verdict import summary_of
-from modeling.participants.choices import ODDITY, ChoiceStudies, oddity_share
-from modeling.participants.effects import EffectPriors
-from modeling.participants.ratings import RatingStudies
+from tactileq.analysis.statistics.participants.mixture import MixtureOfEffects, vague_mean
+from tactileq.analysis.statistics.participants.posterior import Draws, Effort, choice_draws, rating_draws
+from tactileq.analysis.statistics.participants.verdict import summary_of
+from tactileq.modeling.participants.choices import ODDITY, ChoiceStudies, oddity_share
+from tactileq.modeling.participants.effects import EffectPriors
+from tactileq.modeling.participants.ratings import RatingStudies
 
 BOUNDS = (-7.5, 7.5)
 SHORT = Effort(chains=4, warm_up=150, steps=240, every=3)

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.statistics.caveats import EQUALITY, SHOWN, WITHHELD, Caveats
-from analysis.statistics.equivalence import (
+from tactileq.analysis.statistics.caveats import EQUALITY, SHOWN, WITHHELD, Caveats
+from tactileq.analysis.statistics.equivalence import (
     ALL_BUT,
     AVERAGE_FELT,
     DIFFERENT,
@@ -19,8 +19,8 @@ from analysis.statistics.equivalence import (
     FELT,
     INCONCLUSIVE,
 )
-from analysis.statistics.participants.posterior import Draws, r_hat
-from analysis.statistics.participants.verdict import PeopleSummary, summary_of
+from tactileq.analysis.statistics.participants.posterior import Draws, r_hat
+from tactileq.analysis.statistics.participants.verdict import PeopleSummary, summary_of
 
 BOUNDS = (-7.5, 7.5)
 FEW = 0.15
