@@ -40,8 +40,8 @@ install: .venv/installed
 HEADERS := $(wildcard modeling/*/*.h rig/*/*.h benches/*/*.h)
 .venv/installed: .venv/packages pyproject.toml setup.py tools/c_parts.py modeling/rendering/call.c $(HEADERS)
 	@$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
-	@$(BIN)/python -c "from modeling.rendering.compiled import is_compiled; is_compiled()"
-	@$(COMPILE) modeling stimuli rig experiments analysis benches tactileq
+	@$(BIN)/python -c "from tactileq.modeling.rendering.compiled import is_compiled; is_compiled()"
+	@$(COMPILE) tactileq $(wildcard tactileq/*/)
 	@touch $@
 
 demo: install

@@ -20,14 +20,18 @@ def lazily(
     homes : mapping of module name to public names, separated by spaces
         Module names are relative to the package; without names the module itself is public.
     """
-    places = {name: module for module, names in homes.items() for name in names.split() or [module]}
+    places = {
+        name: module
+        for module, names in homes.items()
+        for name in names.split() or [module.rpartition(".")[2]]
+    }
 
     def find(name: str) -> Any:
         """The public object of this name; AttributeError where there is none."""
         if name not in places:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         module = import_module(f"{package}.{places[name]}")
-        found = module if name == places[name] else getattr(module, name)
+        found = getattr(module, name) if name in homes[places[name]].split() else module
         setattr(sys.modules[package], name, found)  # so that it is looked for once
         return found
 

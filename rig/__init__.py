@@ -1,8 +1,1 @@
 """The rig, which presents surfaces to a hand, its simulated twin, and the import of recordings."""
-
-from tactileq import modeling
-
-if not hasattr(modeling, "HOMES"):  # modeling.py beside a script that is run
-    raise ImportError(
-        f"expected the package modeling of tactileq, got {modeling}; rename that, or run python -P."
-    )

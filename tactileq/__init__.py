@@ -1,31 +1,31 @@
-"""The front door: the command line.
+"""Record a surface, keep what a finger can feel, render it, and test with people.
 
-Rooms are top-level packages. So `python -m tactileq` would import `modeling.py` of the working
-folder in place of the room; every way into the command line passes here and says so.
+`import tactileq as tq` is the public face: all names of the shared modeling package and some of the
+other rooms, each loaded on first use. Modules below it may change.
 """
 
-from importlib.util import find_spec
-from pathlib import Path
+from tactileq.modeling import HOMES as _MODELING
+from tactileq.modeling.face import lazily
 
-ROOMS = ("modeling", "stimuli", "rig", "experiments", "analysis", "benches")
+HOMES = {f"modeling.{module}": names for module, names in _MODELING.items()} | {
+    "stimuli.planted.textures": "planted_texture record_texture",
+    "analysis.textures.results": "TextureResult",
+    "analysis.spectra.comparison": "compare_spectra",
+    "analysis.spectra.figures.spectra": "figure_spectra_and_threshold",
+    "experiments.study.study": "Study",
+    "experiments.study.task_plan": "TaskPlan",
+    "experiments.study.models": "ModelSets",
+    "experiments.study.design": "SessionPlan fisher_yates",
+    "experiments.sessions.writer": "StoreError",
+    "experiments.sessions.task": "Task",
+    "experiments.sessions.running": "Circumstances run_session",
+    "experiments.sessions.trial_loop": "People SessionResult run_trials",
+    "experiments.tasks": "plan_session task_named",
+    "experiments.publishing.presented": "render_presentation",
+    "experiments.observers.psychometrics": "Psychometrics Trait",
+    "experiments.observers.percepts": "Perception",
+    "experiments.observers.in_memory": "simulate_sessions",
+    "experiments.observers.whole_study": "simulate_study",
+}
 
-
-def _in_place_of_rooms() -> list[str]:
-    """What Python finds elsewhere than beside this package, under the name of a room."""
-    found = {name: find_spec(name) for name in ROOMS}
-    places = {
-        name: spec.origin or str(next(iter(spec.submodule_search_locations or ["?"])))
-        for name, spec in found.items()
-        if spec is not None
-    }
-    own = Path(__file__).resolve().parents[1]
-    return [
-        place for name, place in places.items() if own / name not in Path(place).resolve().parents
-    ]
-
-
-if _others := _in_place_of_rooms():
-    raise SystemExit(
-        f"error: expected the packages {', '.join(ROOMS)} of tactileq, got {', '.join(_others)} in "
-        "place of one; rename it, or run the program tactileq, or python -P -m tactileq."
-    )
+__getattr__, __dir__, __all__ = lazily(__name__, HOMES)

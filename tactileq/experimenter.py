@@ -30,7 +30,7 @@ CLOSED = "the experimenter's terminal was closed"
 
 
 class Terminal:
-    """An experimenter at a terminal; implements `tactileq.experiments.sessions.people.Experimenter`.
+    """An experimenter at a terminal: an `Experimenter` of sessions.
 
     Enter confirms what was asked last. A line "stop" ends the session at the next sample, or at
     once where one is asked for, and asks for the reason.

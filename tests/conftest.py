@@ -224,7 +224,9 @@ def _told(clock: GivenClock) -> str:
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports of this process without the time that drawing takes: no picture holds anything."""
     signature = b"\x89PNG\r\n\x1a\n"
-    monkeypatch.setattr("tactileq.analysis.report.report.png_of", lambda figure, *, dpi: (signature, ""))
+    monkeypatch.setattr(
+        "tactileq.analysis.report.report.png_of", lambda figure, *, dpi: (signature, "")
+    )
     monkeypatch.setattr("tactileq.analysis.report.report.svg_of", lambda figure: (b"<svg/>", ""))
 
 

@@ -19,7 +19,15 @@ from tactileq.experiments.sessions.bids_tables import table_bytes
 from tactileq.experiments.tasks.threshold_table import READ, read_answers
 from tactileq.modeling import InputError, RecordingSet, Threshold
 from tactileq.modeling.files.answer_tables import ANSWER_TABLES, PARTICIPANT_COLUMNS, PARTICIPANT_ID
-from tactileq.modeling.files.columns import ABOVE_0, Column, Columns, markdown, names, sidecar, without
+from tactileq.modeling.files.columns import (
+    ABOVE_0,
+    Column,
+    Columns,
+    markdown,
+    names,
+    sidecar,
+    without,
+)
 from tactileq.modeling.files.stimulus_table import STIMULUS_COLUMNS as MANIFEST_COLUMNS
 from tactileq.modeling.files.tables import Row, read_table, table_text
 from tactileq.modeling.perception.thresholds import THRESHOLD_COLUMNS

@@ -1,12 +1,12 @@
 """The C parts of the project and their cffi bindings; run by setup.py, without the project.
 
-`tactileq.modeling.rendering._kernel` is the rendering kernel, `_kernel_single` the same in single precision,
-`_many` renders many streams side by side, `tactileq.modeling.estimation._slopes` is what the fit of layers
-spends its time on, `tactileq.benches.rendering._rivals` is what the bench compares,
-`tactileq.rig.live._live` is the memory that processes of a rig share, the callback that plays and the servo
-of a force device, `tactileq.rig.force._standin` a stand-in for the library of its maker,
-`tactileq.rig.device._device` the firmware on a simulated board, `tactileq.rig.recorder._recorder` the recorder's
-law on simulated mechanics.
+`tactileq.modeling.rendering._kernel` is the rendering kernel, `_kernel_single` the same in single
+precision, `_many` renders many streams side by side, `tactileq.modeling.estimation._slopes` is what
+the fit of layers spends its time on, `tactileq.benches.rendering._rivals` is what the bench
+compares, `tactileq.rig.live._live` is the memory that processes of a rig share, the callback that
+plays and the servo of a force device, `tactileq.rig.force._standin` a stand-in for the library of
+its maker, `tactileq.rig.device._device` the firmware on a simulated board,
+`tactileq.rig.recorder._recorder` the recorder's law on simulated mechanics.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ slopes = binding(
 
 
 def live_binding() -> FFI:
-    """The builder of `tactileq.rig.live._live`; what processes or threads share is opaque to Python."""
+    """The builder of `_live`; what processes or threads share is opaque to Python."""
     voice = re.search(
         r"^typedef struct \{[^}]*\} tq_voice;$", PLAYER.read_text("utf-8"), re.MULTILINE
     )
@@ -155,7 +155,7 @@ def live_binding() -> FFI:
 
 
 def standin_binding() -> FFI:
-    """The builder of `tactileq.rig.force._standin`: Force Dimension's functions without a device.
+    """The builder of `_standin`: Force Dimension's functions without a device.
 
     It is loaded as the maker's is, and its further functions say what the device does and suffers.
     """
@@ -188,7 +188,7 @@ def virtual_board() -> str:
 
 
 def device_binding() -> FFI:
-    """The builder of `tactileq.rig.device._device`: the firmware on a simulated board."""
+    """The builder of `_device`: the firmware on a simulated board."""
     header = DEVICE / "virtual.h"
     builder = FFI()
     numbers = "typedef double tq_number;\n#define TQ_MOTORS 2"
@@ -208,7 +208,7 @@ def device_binding() -> FFI:
 
 
 def recorder_binding() -> FFI:
-    """The builder of `tactileq.rig.recorder._recorder`: the recorder's law on simulated mechanics."""
+    """The builder of `_recorder`: the recorder's law on simulated mechanics."""
     headers = [OBSERVER, *(RECORDER / f"{name}.h" for name in ("control", "plant"))]
     folders = [RECORDER, DEVICE, FORCE.parent, LIVE.parent]
     builder = FFI()

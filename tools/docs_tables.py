@@ -17,6 +17,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
+from tactileq.commands.schema import declared  # noqa: E402
 from tactileq.experiments.sessions import bids_events, bids_people, bids_physio, traces  # noqa: E402
 from tactileq.experiments.tasks import threshold_table  # noqa: E402
 from tactileq.modeling.files import answer_tables, stimulus_table  # noqa: E402
@@ -32,7 +33,6 @@ from tactileq.rig.importing import labels  # noqa: E402
 from tactileq.rig.recorder import store as recorder_store  # noqa: E402
 from tactileq.rig.recorder.definition import RECORDER  # noqa: E402
 from tactileq.rig.wire import generating  # noqa: E402
-from tactileq.commands.schema import declared  # noqa: E402
 
 TABLES = {
     "recordings": recording_set.KNOWN_COLUMNS,

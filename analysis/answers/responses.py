@@ -45,8 +45,8 @@ class Responses:
     Parameters
     ----------
     answers : mapping of task to DataFrame
-        Main trials of each task that `tactileq.modeling.files.answer_tables` declares, one row each:
-        participant_id, session, and the task's columns (numbers NaN where not answered).
+        Main trials of each task that `tactileq.modeling.files.answer_tables` declares, one row
+        each: participant_id, session, and the task's columns (numbers NaN where not answered).
     simulated_participants : bool
         True where no person took part.
     simulated_rig : bool

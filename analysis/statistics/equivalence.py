@@ -7,7 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from tactileq.analysis.statistics.paired import sign_flips_p, t_tests, why_undefined, without_rounding_noise
+from tactileq.analysis.statistics.paired import (
+    sign_flips_p,
+    t_tests,
+    why_undefined,
+    without_rounding_noise,
+)
 from tactileq.modeling import InputError
 from tactileq.modeling.arrays import Floats
 

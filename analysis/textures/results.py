@@ -9,7 +9,14 @@ import numpy as np
 import pandas as pd
 
 from tactileq.analysis.columns import LAYER, SIMULATED_COLUMN, TEXTURE
-from tactileq.modeling import InputError, LayerVerdict, RecordingSet, Simplification, Spectrum, TextureModel
+from tactileq.modeling import (
+    InputError,
+    LayerVerdict,
+    RecordingSet,
+    Simplification,
+    Spectrum,
+    TextureModel,
+)
 from tactileq.modeling.errors import shown
 from tactileq.modeling.files.columns import Column
 from tactileq.modeling.fitting.conditions import recording_spectra
@@ -33,7 +40,8 @@ class TextureResult:
         Models of other estimators, to be compared with the truth beside `model`.
     left_out : mapping of str to DataFrame
         By model (joint, AR(20), a field of spectra): conditions predicted by one that was fitted
-        without them (`tactileq.analysis.textures.between.left_out_table`); empty where that was not tried.
+        without them (`tactileq.analysis.textures.between.left_out_table`); empty where that was not
+        tried.
     """
 
     recordings: RecordingSet
@@ -134,7 +142,8 @@ def fit_table(results: Sequence[TextureResult]) -> pd.DataFrame:
     -------
     DataFrame
         texture, layers, distance_db, with_blends_db, blend_defect_db (as in
-        `tactileq.modeling.models.fit_summary.FitSummary`), by_layers and warnings (text), simulated.
+        `tactileq.modeling.models.fit_summary.FitSummary`), by_layers and warnings (text),
+        simulated.
     """
     rows = [
         {

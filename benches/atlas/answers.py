@@ -1,8 +1,8 @@
 """The tests of answers in the atlas: effects of ceilings, careless raters and few participants.
 
 Simulated are ratings of a full and a simplified model, one of each per rater, and answers of the
-forced choice; they are analysed by the functions of `tactileq.analysis.statistics` themselves. The same
-raters are drawn along the whole axis, so that edges are clean.
+forced choice; they are analysed by the functions of `tactileq.analysis.statistics` themselves. The
+same raters are drawn along the whole axis, so that edges are clean.
 """
 
 from __future__ import annotations

@@ -7,7 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tactileq.benches.rendering.stability import FORMS, OURS, STROKE_HZ, held_variances, moving_variances
+from tactileq.benches.rendering.stability import (
+    FORMS,
+    OURS,
+    STROKE_HZ,
+    held_variances,
+    moving_variances,
+)
 from tactileq.modeling import RegressedModel, Renderer, TextureModel
 from tactileq.modeling.hand import Hand
 from tactileq.modeling.models.parameter_table import Parameters

@@ -220,7 +220,9 @@ class RenderingBench:
             rows.append(_aim(what, at, row[what], least=least))
         sweep = f"{SWEEP[0]} to {SWEEP[-1]} layers"
         rows.append(_aim("cost is linear in layers: R²", sweep, self.line.r_squared, least=0.99))
-        rows.append(_aim("import tactileq.modeling, s", "a process of its own", self.import_s, most=0.5))
+        rows.append(
+            _aim("import tactileq.modeling, s", "a process of its own", self.import_s, most=0.5)
+        )
         return pd.DataFrame(rows)
 
 
@@ -407,10 +409,8 @@ def _in_calls(stream: CompiledStream, effort: BenchEffort, *, block: int | None 
 
 def _import_s(starts: int) -> float:
     command = [sys.executable, "-c", _IMPORT]
-    rooms = Path(__file__).parents[2]  # a file modeling.py in the working folder is not ours
     runs = [
-        subprocess.run(command, cwd=rooms, capture_output=True, text=True, check=True)
-        for _ in range(starts)
+        subprocess.run(command, capture_output=True, text=True, check=True) for _ in range(starts)
     ]
     return float(np.median([float(run.stdout) for run in runs]))
 

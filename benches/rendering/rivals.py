@@ -35,7 +35,7 @@ _SPECTRUM_SAMPLES = 5000
 
 
 def compiled_parts(name: str) -> tuple[Any, Any]:
-    """The cffi pair (ffi, lib) of `tactileq.modeling.rendering._kernel` or `tactileq.benches.rendering._rivals`.
+    """The cffi pair (ffi, lib) of a compiled module, such as `tactileq.modeling.rendering._kernel`.
 
     Raises
     ------

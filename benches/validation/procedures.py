@@ -15,11 +15,20 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import integrate, stats
 
-from tactileq.analysis.chapters.confusions.information import information_bits, transferred_information
+from tactileq.analysis.chapters.confusions.information import (
+    information_bits,
+    transferred_information,
+)
 from tactileq.analysis.chapters.single_answers.gee import fit_gee
 from tactileq.analysis.statistics.equivalence import ALPHA, Bounds, one_sided_tests
 from tactileq.analysis.statistics.mixed import fit_mixed, t_of
-from tactileq.analysis.statistics.paired import CONFIDENCE, d_z_interval, holm, sign_flips_p, t_tests
+from tactileq.analysis.statistics.paired import (
+    CONFIDENCE,
+    d_z_interval,
+    holm,
+    sign_flips_p,
+    t_tests,
+)
 from tactileq.analysis.statistics.rates import clopper_pearson
 from tactileq.benches.raters import (
     HIGHEST,

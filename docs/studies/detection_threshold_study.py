@@ -1,7 +1,8 @@
 """How well planted detection thresholds are recovered, by trials, compared with a staircase.
 
 Simulated: observers with random smooth thresholds at the eight frequencies of the task answer as
-`tactileq.experiments.tasks.threshold` asks (QUEST+), and as a 3-down 1-up staircase of PsychoPy asks.
+`tactileq.experiments.tasks.threshold` asks (QUEST+), and as a 3-down 1-up staircase of PsychoPy
+asks.
 
 Example: python docs/studies/detection_threshold_study.py writes detection_threshold_study.tsv and
 .png beside this file and prints the table.

@@ -1,8 +1,8 @@
 """How `joint` performs on textures more difficult than sums of layers on white noise.
 
-Simulated: random layers whose places are known (`tactileq.stimuli.planted.spectra`), over 2 × 2 conditions
-of one level each, with difficulties met in laboratories: coloured floors, mains hum, a pure tone,
-many layers, short and long records, a turntable that slows down, a level that changes.
+Simulated: random layers whose places are known (`tactileq.stimuli.planted.spectra`), over 2 × 2
+conditions of one level each, with difficulties met in laboratories: coloured floors, mains hum, a
+pure tone, many layers, short and long records, a turntable that slows down, a level that changes.
 
 Example: python docs/studies/harder_truths_study.py writes harder_truths_study.tsv beside this file
 and prints the table. `--textures 20 --out before.tsv` in a checkout of an earlier version gives the

@@ -33,7 +33,13 @@ from tactileq.modeling.arrays import Floats
 from tactileq.modeling.fitting.spectral_field import fit_spectral_field
 from tactileq.modeling.models.grid import Condition
 from tactileq.modeling.threads import one_linear_algebra_thread
-from tactileq.stimuli.planted.drawn import FORCES_N, SPEEDS_MM_S, DrawnSurface, alter_surface, draw_surface
+from tactileq.stimuli.planted.drawn import (
+    FORCES_N,
+    SPEEDS_MM_S,
+    DrawnSurface,
+    alter_surface,
+    draw_surface,
+)
 
 SURFACES = 40
 FIRST = 1000  # surfaces that no constant of the estimator was chosen by

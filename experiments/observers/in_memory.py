@@ -8,7 +8,11 @@ from functools import partial
 from tactileq.experiments.observers.experimenter import SimulatedExperimenter
 from tactileq.experiments.observers.percepts import Perception
 from tactileq.experiments.observers.psychometrics import Psychometrics
-from tactileq.experiments.observers.simulated import SimulatedParticipant, occasion_of, require_plantable
+from tactileq.experiments.observers.simulated import (
+    SimulatedParticipant,
+    occasion_of,
+    require_plantable,
+)
 from tactileq.experiments.sessions.order import draw_session
 from tactileq.experiments.sessions.store import MemoryStore
 from tactileq.experiments.sessions.trial_loop import People, run_trials

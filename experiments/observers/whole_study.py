@@ -8,7 +8,11 @@ from pathlib import Path
 from tactileq.experiments.observers.experimenter import SimulatedExperimenter
 from tactileq.experiments.observers.percepts import Perception
 from tactileq.experiments.observers.psychometrics import Psychometrics
-from tactileq.experiments.observers.simulated import SimulatedParticipant, occasion_of, require_plantable
+from tactileq.experiments.observers.simulated import (
+    SimulatedParticipant,
+    occasion_of,
+    require_plantable,
+)
 from tactileq.experiments.sessions.bids import export_all
 from tactileq.experiments.sessions.running import Circumstances, run_session
 from tactileq.experiments.sessions.trial_loop import People, SessionResult

@@ -95,7 +95,9 @@ def _hand(held: StoredSession, runs: set[int]) -> tuple[Made, tuple[str, ...]]:
     found = hand_rows(path, runs=runs)
     if not found.rows:
         return {}, found.damaged
-    from tactileq.experiments.sessions import bids_physio  # late: pandas takes longer to load than all else
+    from tactileq.experiments.sessions import (
+        bids_physio,  # late: pandas takes longer to load than all else
+    )
 
     onsets = bids_events.onsets_s(held.state.events)
     made, damaged = {}, [*found.damaged]

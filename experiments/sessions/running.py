@@ -101,7 +101,8 @@ def run_session(
     SessionResult
         Not completed if somebody ended it early.
     Path
-        Its manifest, beside which its log lies; `tactileq.experiments.sessions.bids` makes tables of them.
+        Its manifest, beside which its log lies; `tactileq.experiments.sessions.bids` makes tables
+        of them.
 
     Raises
     ------

@@ -86,7 +86,8 @@ def run_trials(
     pilot : bool
         Whether the answers do not count.
     exposed_g2_s : float
-        Weighted vibration that the participant had that day (`tactileq.experiments.sessions.exposure`).
+        Weighted vibration that the participant had that day
+        (`tactileq.experiments.sessions.exposure`).
 
     Returns
     -------

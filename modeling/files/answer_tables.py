@@ -1,8 +1,8 @@
 """The tables of answers and of participants: experiments write them, analysis reads them.
 
 A task exists once its table stands in `ANSWER_TABLES`; what is presented and asked in it is in
-`tactileq.experiments.tasks`, in a module of the task's name. What the report says of it follows from the
-table (docs/own-protocol.md).
+`tactileq.experiments.tasks`, in a module of the task's name. What the report says of it follows
+from the table (docs/own-protocol.md).
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ and by `key` what it means, its unit and its limits::
         stroke_hz: Annotated[float, key("strokes back and forth", unit="Hz", ge=0, le=20)] = 2.0
 
 From it follow reading, refusing, defaults, the JSON Schema and the tables of the documentation
-(`tactileq.modeling.files.describing`). msgspec converts values and holds their limits. The sentences are
-ours: its own ("Expected `int`, got `str`") say neither range nor unit nor what to do.
+(`tactileq.modeling.files.describing`). msgspec converts values and holds their limits. The
+sentences are ours: its own ("Expected `int`, got `str`") say neither range nor unit nor what to do.
 
 docs/where.md#a-key-of-a-file
 """
@@ -45,7 +45,14 @@ from tactileq.modeling.arrays import Bools
 from tactileq.modeling.checks import check_keys
 from tactileq.modeling.errors import InputError, shown
 from tactileq.modeling.files.documents import check_version, read_toml
-from tactileq.modeling.files.values import NameOrFile, is_valid, item_of, within, without_numpy, words
+from tactileq.modeling.files.values import (
+    NameOrFile,
+    is_valid,
+    item_of,
+    within,
+    without_numpy,
+    words,
+)
 
 
 def key(

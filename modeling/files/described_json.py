@@ -1,4 +1,4 @@
-"""JSON files that programs write, declared once: the sections of `tactileq.modeling.files.described`.
+"""JSON files that programs write, declared once, as sections of `modeling/files/described.py`.
 
 docs/where.md#a-key-of-a-file
 """

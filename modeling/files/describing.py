@@ -7,7 +7,14 @@ from typing import Any
 
 import msgspec
 
-from tactileq.modeling.files.described import NOT_FINITE, DescribedFile, FileSection, Key, keys_of, plain
+from tactileq.modeling.files.described import (
+    NOT_FINITE,
+    DescribedFile,
+    FileSection,
+    Key,
+    keys_of,
+    plain,
+)
 from tactileq.modeling.files.described_json import DescribedJson
 
 BAR = r"\|"  # in a cell of Markdown

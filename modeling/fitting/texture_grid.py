@@ -10,7 +10,13 @@ import numpy as np
 
 from tactileq.modeling.arrays import Bools, Floats, Integers
 from tactileq.modeling.estimation.coherent import Observed, limits_of, observe
-from tactileq.modeling.estimation.likelihood import LOWEST_FITTED_HZ, NEPER_DB, Power, signal_power, split
+from tactileq.modeling.estimation.likelihood import (
+    LOWEST_FITTED_HZ,
+    NEPER_DB,
+    Power,
+    signal_power,
+    split,
+)
 from tactileq.modeling.fitting.blending import Middles
 from tactileq.modeling.fitting.equations import Corners, cells, corners_of
 from tactileq.modeling.fitting.field import Field

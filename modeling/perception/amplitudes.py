@@ -24,7 +24,8 @@ def layer_amplitudes_g(model: TextureModel | PEQ, *, criterion: CriterionName) -
     `energy`: the sinusoid of equal power, √2·G·√(k/(1+k)). `paper-fft`: the single-sided FFT
     amplitude of the peak in a record of 1 s, G·√(π/N). `paper-gain`: G itself
     (docs/method/perception.md#criteria). By the paper's two it is what decides; by `energy` it is
-    so only of a layer without others and without noise (`tactileq.modeling.perception.power_changes`).
+    so only of a layer without others and without noise
+    (`tactileq.modeling.perception.power_changes`).
     """
     gains = np.abs(model.gains)
     if criterion == "paper-gain":

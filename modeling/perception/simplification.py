@@ -15,7 +15,12 @@ from tactileq.modeling.perception.by_power import decided_by_power, distances_al
 from tactileq.modeling.perception.decisions import Decision
 from tactileq.modeling.perception.signs_of_rest import with_signs_chosen_again
 from tactileq.modeling.perception.thresholds import Threshold
-from tactileq.modeling.perception.verdicts import CRITERIA, CriterionName, LayerVerdict, Simplification
+from tactileq.modeling.perception.verdicts import (
+    CRITERIA,
+    CriterionName,
+    LayerVerdict,
+    Simplification,
+)
 
 
 def distances_db(
@@ -61,8 +66,8 @@ def simplify(
 
     Where no threshold is known a layer is kept; but above the table's end its last level is held
     as a lower bound, below which a layer may be dropped. A layer that only fills another's shape
-    (`tactileq.modeling.models.own_peaks`) is dropped with that one or not at all. The noise and at least
-    one layer are always kept (PAPER V).
+    (`tactileq.modeling.models.own_peaks`) is dropped with that one or not at all. The noise and at
+    least one layer are always kept (PAPER V).
 
     Parameters
     ----------

@@ -77,7 +77,8 @@ def check_models(rig: RigFile, models: Iterable[AnyModel]) -> None:
     ------
     InputError
         For one that is not in g, or of a higher rate than the card's; for an AR model that
-        `lattice_fields` refuses. Where a device renders it, as `tactileq.rig.device.models.device_model`.
+        `lattice_fields` refuses. Where a device renders it, as
+        `tactileq.rig.device.models.device_model`.
     """
     for model in models:
         if model.unit != "g":

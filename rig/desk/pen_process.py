@@ -1,7 +1,7 @@
 """The process that follows an accelerometer at the pen, and keeps what is asked for.
 
-It is driven by `tactileq.rig.desk.messages`, and a process of its own since PortAudio may end, or stop
-indefinitely, a process whose sound server dies.
+It is driven by `tactileq.rig.desk.messages`, and a process of its own since PortAudio may end, or
+stop indefinitely, a process whose sound server dies.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """A device that renders by itself in the place of a servo: `python -m tactileq.rig.device.servo`.
 
-It is driven by `tactileq.rig.force.messages` and speaks to the other processes of a rig as the servo of a
-force device does (rig/force/servo.h): what they ask for goes over the wire, and records come back
-as readings of the hand. The law runs in the device (docs/device.md#in-a-rig).
+It is driven by `tactileq.rig.force.messages` and speaks to the other processes of a rig as the
+servo of a force device does (rig/force/servo.h): what they ask for goes over the wire, and records
+come back as readings of the hand. The law runs in the device (docs/device.md#in-a-rig).
 """
 
 from __future__ import annotations

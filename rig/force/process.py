@@ -1,4 +1,4 @@
-"""The servo's process: `python -m tactileq.rig.force.process`, driven by `tactileq.rig.force.messages`.
+"""The servo's process, driven by `tactileq.rig.force.messages`.
 
 Python opens the device and hands it to `tq_servo_run` (rig/force/servo.h), which keeps this thread
 until it is asked to stop. Where the parent is gone, the force ramps to 0 and the process ends

@@ -1,4 +1,4 @@
-"""The watchdog's process: `python -m tactileq.rig.force.watchdog`, driven by `tactileq.rig.force.messages`.
+"""The watchdog's process, driven by `tactileq.rig.force.messages`.
 
 A servo that was stopped cannot end its own force. Where one that may push has not ticked for 20 ms,
 it is killed, and the device opened and released in its place. Nothing is armed again

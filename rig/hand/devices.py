@@ -23,7 +23,9 @@ def open_device(settings: HandSettings) -> Device:
     if settings.kind == "scripted":
         return ScriptedHand.open(settings)
     if settings.kind == "serial":
-        from tactileq.rig.hand.serial_sensor import SerialSensor  # pyserial, which others do not need
+        from tactileq.rig.hand.serial_sensor import (
+            SerialSensor,  # pyserial, which others do not need
+        )
 
         return SerialSensor.open(settings)
     if settings.kind in ("tablet", "mouse") and sys.platform == "linux":

@@ -34,10 +34,10 @@ class ChildLost(RuntimeError):
 def _started(module: str, complaints: IO[bytes]) -> subprocess.Popen[bytes]:
     """`python -P -m MODULE`, with pipes; its standard error goes to `complaints`.
 
-    Its rooms are those of this process, installed or not. Without -P a file `rig.py` in the working
-    folder would be imported in place of the room.
+    Its rooms are those of this process, installed or not. Without -P a file `numpy.py` in the
+    working folder would be imported in place of the library.
     """
-    rooms = str(Path(__file__).resolve().parents[2])
+    rooms = str(Path(__file__).parents[3])
     others = [path for path in (os.environ.get("PYTHONPATH"),) if path]
     # Installed ones are found without, and PYTHONPATH would put their neighbours, such as an old
     # copy of a module of the standard library, before the standard library.

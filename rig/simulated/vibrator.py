@@ -36,8 +36,8 @@ _RANGES = {
 class SimulatedTransducers:
     """What is known of a simulated vibrator and of the accelerometer that it shakes.
 
-    It answers a drive w by G_w·(w + (R − 1)·H_BP(w)), one layer as `tactileq.modeling.vibrators.Vibrator`
-    describes it.
+    It answers a drive w by G_w·(w + (R − 1)·H_BP(w)), one layer as
+    `tactileq.modeling.vibrators.Vibrator` describes it.
 
     Parameters
     ----------

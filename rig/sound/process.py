@@ -1,4 +1,4 @@
-"""The process that plays: `python -m tactileq.rig.sound.process`, driven by `tactileq.rig.sound.messages`.
+"""The process that plays, driven by `tactileq.rig.sound.messages`.
 
 A process of its own, so that nothing that the experiment does delays it and it can be killed when a
 sound server hangs. PortAudio calls `tq_sound_callback` (`rig/live/sound.h`); Python here only

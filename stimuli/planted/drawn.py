@@ -201,7 +201,9 @@ def _statistics() -> _Statistics:
 
 def _table(name: str) -> Floats:
     """The numbers of one table; NaN for the names in its first column."""
-    file = resources.files("tactileq.stimuli.planted").joinpath("spectral_statistics", f"{name}.tsv")
+    file = resources.files("tactileq.stimuli.planted").joinpath(
+        "spectral_statistics", f"{name}.tsv"
+    )
     with file.open(encoding="utf-8") as lines:
         return np.genfromtxt(lines, delimiter="\t", skip_header=1)
 

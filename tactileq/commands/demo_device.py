@@ -125,10 +125,10 @@ def recorded_texture(
     name: str, folder: Path, *, threshold: Threshold, seed: int
 ) -> tuple[TextureResult, TextureModel]:
     """A planted texture from the simulated recorder, and a model of the direct route."""
+    from tactileq.commands.record_recorder import RecorderRecording, record_quietly
     from tactileq.modeling import fit_texture
     from tactileq.modeling.files.writing import file_stem
     from tactileq.stimuli.planted.textures import RECORDER_RATE_HZ, planted_texture, record_texture
-    from tactileq.commands.record_recorder import RecorderRecording, record_quietly
 
     truth = planted_texture(name, rate_hz=RECORDER_RATE_HZ)
     options = RecorderRecording(name, 1.0, 1, seed=seed)

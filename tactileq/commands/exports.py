@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from tactileq.modeling.errors import counted
 from tactileq.commands.stimuli import print_beyond_grid, recipe_from
+from tactileq.modeling.errors import counted
 from tactileq.options import ModelFile, Seed, VibratorFile
 from tactileq.own_results import note_of_file, write_own_files
 from tactileq.printing import simulated_note

@@ -9,8 +9,8 @@ from typing import Annotated, Literal
 
 import typer
 
-from tactileq.modeling.errors import counted
 from tactileq.many_textures import HowToModel, TextureOutcome, model_textures
+from tactileq.modeling.errors import counted
 from tactileq.options import Out
 
 

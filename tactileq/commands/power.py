@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactileq.modeling.errors import shown
 from tactileq.commands.session import models_of_study
+from tactileq.modeling.errors import shown
 from tactileq.options import (
     Models,
     Out,

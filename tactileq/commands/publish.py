@@ -44,16 +44,16 @@ def publish(
 
     Example: tactileq publish data --study study.toml --out archive
     """
+    from tactileq.archive import COMMAND, DATA
+    from tactileq.archive_metadata import Publication
+    from tactileq.bids_validator import bids_issues, said_of
+    from tactileq.commands.analyze import analyze
     from tactileq.experiments.study.study import Study
     from tactileq.modeling import InputError
     from tactileq.modeling.errors import counted
     from tactileq.modeling.files.folders import replace_folder
     from tactileq.modeling.files.hashes import seal_over, sha256_of_paths
     from tactileq.modeling.files.provenance import provenance_of, seal_folder, sha256_of_files
-    from tactileq.archive import COMMAND, DATA
-    from tactileq.archive_metadata import Publication
-    from tactileq.bids_validator import bids_issues, said_of
-    from tactileq.commands.analyze import analyze
     from tactileq.publishing import assemble, check_publishable, checked_models
     from tactileq.verification import require_verified
 

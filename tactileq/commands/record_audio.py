@@ -10,10 +10,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactileq.modeling.errors import counted
 from tactileq.commands.imports import imports_before
 from tactileq.commands.record_map import recording_map
 from tactileq.commands.record_more import NOTHING_MORE, further_conditions
+from tactileq.modeling.errors import counted
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -70,7 +70,11 @@ def further_conditions(folder: Path, texture: str) -> list[Condition]:
 def _recorded(folder: Path, texture: str) -> RecordingSet:
     """The usable recordings of a texture, in g; a warning names the others."""
     from tactileq.modeling.fitting.conditions import only_unit
-    from tactileq.modeling.recordings.recording_set import is_recording_set, load_usable, textures_in
+    from tactileq.modeling.recordings.recording_set import (
+        is_recording_set,
+        load_usable,
+        textures_in,
+    )
 
     found = textures_in(folder) if is_recording_set(folder) else ()
     if texture not in found:

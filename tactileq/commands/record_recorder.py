@@ -9,9 +9,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactileq.modeling.errors import InputError, counted
 from tactileq.commands.imports import imports_before
 from tactileq.commands.record_more import NOTHING_MORE, further_conditions
+from tactileq.modeling.errors import InputError, counted
 from tactileq.printing import progress
 
 if TYPE_CHECKING:
@@ -42,7 +42,11 @@ class RecorderRecording:
 def record_on_recorder(folder: Path, recorder: str, options: RecorderRecording) -> None:
     """Record what the folder misses, until nothing is missing."""
     from tactileq.rig.recorder.driver import Recorder
-    from tactileq.rig.recorder.recorder_file import IN_VIRTUAL_TIME, SHIPPED_RECORDER_FILE, RecorderFile
+    from tactileq.rig.recorder.recorder_file import (
+        IN_VIRTUAL_TIME,
+        SHIPPED_RECORDER_FILE,
+        RecorderFile,
+    )
 
     path = SHIPPED_RECORDER_FILE if recorder == IN_VIRTUAL_TIME else Path(recorder)
     file = RecorderFile.load(path)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactileq.modeling.errors import InputError
 from tactileq.interruption import Interrupted
+from tactileq.modeling.errors import InputError
 from tactileq.options import RigPath
 
 if TYPE_CHECKING:

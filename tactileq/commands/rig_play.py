@@ -89,10 +89,10 @@ def chosen_signal(
 
 def play(rig: RigFile, signal: PreparedSignal, *, times: int) -> None:
     """Play a signal `times` times in succession."""
+    from tactileq.printing import progress
     from tactileq.rig.desk.lock import rig_locked
     from tactileq.rig.desk.parts import vibration_output
     from tactileq.rig.live.memory import Live
-    from tactileq.printing import progress
 
     compensated = signal.vibrator_sha256 is not None
     with rig_locked(rig.rig.name), Live.create() as live:

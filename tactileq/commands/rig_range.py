@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactileq.modeling.errors import counted
 from tactileq.commands.record_audio import HandOptions, hand_from, opened_hand, rig_from, since_now
+from tactileq.modeling.errors import counted
 from tactileq.options import AssumedForce, CountsPerMm, HandDevice, HandKind, OptionalRigPath, Out
 from tactileq.own_results import note_of_file, write_own_files
 from tactileq.printing import share_of

@@ -68,6 +68,7 @@ def session(
 
     Example: tactileq session --task absolute --subject 1 --rig rig.toml --data data
     """
+    from tactileq.experimenter import Terminal
     from tactileq.experiments.console.languages import require_texts
     from tactileq.experiments.sessions.bids import export_session
     from tactileq.experiments.sessions.log import SEAL_WRITTEN
@@ -76,7 +77,6 @@ def session(
     from tactileq.experiments.sessions.trial_loop import People
     from tactileq.experiments.study.study import Study
     from tactileq.experiments.tasks import task_named
-    from tactileq.experimenter import Terminal
 
     plan = Study.load(study)
     require_texts(plan)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactileq.modeling.errors import counted
 from tactileq.many_textures import recording_folders
+from tactileq.modeling.errors import counted
 from tactileq.options import Criterion, HoldAbove, Margin, ModelFile, ThresholdName
 from tactileq.own_results import check_own_files, write_own_files
 from tactileq.printing import simulated_note, usable_recordings

@@ -18,9 +18,9 @@ def study_validate(
 
     Example: tactileq study validate data
     """
+    from tactileq.bids_validator import bids_issues, said_of
     from tactileq.experiments.sessions.files import require_data_folder
     from tactileq.modeling.errors import counted
-    from tactileq.bids_validator import bids_issues, said_of
 
     require_data_folder(data)
     issues = bids_issues(data)

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from tactileq.modeling.errors import counted
 from tactileq.commands.study_status import print_made
+from tactileq.modeling.errors import counted
 from tactileq.options import Data
 
 Subject = Annotated[int, typer.Argument(metavar="SUBJECT", min=1, help="Number of the person.")]

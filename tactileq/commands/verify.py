@@ -27,9 +27,9 @@ def verify(
 
     Example: tactileq verify data analysis-results
     """
-    from tactileq.experiments.verification.verifying import verify_data
     from tactileq.archive import DATA, REPORT, is_archive
     from tactileq.commands.analyze import analyze
+    from tactileq.experiments.verification.verifying import verify_data
     from tactileq.verification import print_data_differences, print_differences
     from tactileq.verified_results import verify_archive, verify_models, verify_results
 

@@ -12,6 +12,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.signal import resample, resample_poly
 
 from tactileq.analysis.spectra.findings import find_in
+from tactileq.many_textures import HowToModel, model_textures
 from tactileq.modeling import (
     ESTIMATORS,
     Recording,
@@ -25,7 +26,6 @@ from tactileq.modeling import (
 from tactileq.modeling.fitting.autoregressive import fit_filter
 from tactileq.modeling.recordings.spectrum import MODEL_RATE_HZ
 from tactileq.stimuli.planted.textures import planted_texture
-from tactileq.many_textures import HowToModel, model_textures
 
 RECORDER_RATE_HZ = 22704.0
 AR_ORDER = 20

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 import typer
 
+from tactileq import app
 from tactileq.experiments.observers.whole_study import simulate_study
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.study import Study
@@ -20,7 +21,6 @@ from tactileq.modeling import Threshold, simplify
 from tactileq.modeling.files.claims import ClaimSection, PlanSection
 from tactileq.rig.twin import SimulatedRig
 from tactileq.stimuli.planted.textures import planted_texture
-from tactileq import app
 
 SMALL_STUDY = """
 name = "small"

@@ -12,8 +12,8 @@ import pandas as pd
 import pytest
 
 from tactileq.analysis.answers import loading
-from tactileq.modeling.files.hashes import sha256_of_file, sha256_of_paths
 from tactileq.commands.analyze import _later_plan, read_answers
+from tactileq.modeling.files.hashes import sha256_of_file, sha256_of_paths
 
 
 @pytest.fixture(autouse=True)

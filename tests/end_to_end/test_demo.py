@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from tactileq.experiments import Study
+from tactileq import Study
 from tactileq.modeling import RecordingSet, TextureModel
 from tactileq.modeling.models.loading import models_in
 from tactileq.modeling.perception.verdicts import load_simplifications

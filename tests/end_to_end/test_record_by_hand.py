@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tactileq.commands.record_audio import InputOptions, input_from, print_assumed
 from tactileq.modeling import RecordingSet
 from tactileq.rig.capture.grid import StrokeGrid
 from tactileq.rig.capture.input import InputSettings
 from tactileq.rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
-from tactileq.commands.record_audio import InputOptions, input_from, print_assumed
 from tests.conftest import ENDED_WITH_US
 from tests.rig.waiting import wait_until
 

@@ -13,10 +13,10 @@ from typing import Any
 
 import pytest
 
+from tactileq.commands.rig_monitor import _play_on
 from tactileq.modeling import InputError
 from tactileq.rig.live.memory import Live
 from tactileq.stimuli.planted.textures import planted_texture
-from tactileq.commands.rig_monitor import _play_on
 from tests.rig.desk.rig_files import rig_file
 from tests.rig.waiting import wait_until
 

@@ -17,7 +17,14 @@ from tactileq.experiments.study.task_plan import TaskPlan
 from tactileq.experiments.tasks.absolute import AbsoluteTrial
 from tactileq.experiments.tasks.relative import RelativeTrial
 from tactileq.modeling import TextureModel, Threshold, simplify
-from tactileq.rig.interface import Acceleration, Fault, HandRows, PresentationRecord, RigHealth, RigReading
+from tactileq.rig.interface import (
+    Acceleration,
+    Fault,
+    HandRows,
+    PresentationRecord,
+    RigHealth,
+    RigReading,
+)
 from tactileq.stimuli.planted.textures import planted_texture
 
 TEXTURES = ("canvas", "MDF", "PVC")

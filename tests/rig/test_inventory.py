@@ -12,7 +12,14 @@ import pytest
 from tactileq.modeling import InputError
 from tactileq.rig import inventory
 from tactileq.rig.hand.sample import ConnectedDevice
-from tactileq.rig.inventory import Finding, connected_input, connected_sound, of_rig, remedies, versions
+from tactileq.rig.inventory import (
+    Finding,
+    connected_input,
+    connected_sound,
+    of_rig,
+    remedies,
+    versions,
+)
 from tactileq.rig.sound.devices import NoPortAudio, SoundDevice
 from tests.refusals import check_refusal
 from tests.rig.desk.rig_files import rig_file, rig_text

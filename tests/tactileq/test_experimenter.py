@@ -11,8 +11,8 @@ from typing import TextIO
 import pytest
 from rich.console import Console
 
-from tactileq.experiments.sessions.people import ProgressReport, SessionAborted
 from tactileq.experimenter import Terminal
+from tactileq.experiments.sessions.people import ProgressReport, SessionAborted
 from tests.refusals import refused
 from tests.rig.waiting import wait_until
 

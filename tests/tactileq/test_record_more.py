@@ -9,10 +9,6 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from tactileq.modeling import InputError, RecordingSet
-from tactileq.rig.capture.coverage import Coverage
-from tactileq.rig.capture.grid import StrokeGrid
-from tactileq.stimuli.planted.drawn import draw_surface
 from tactileq.commands import record_audio
 from tactileq.commands.record_audio import (
     HandOptions,
@@ -22,6 +18,10 @@ from tactileq.commands.record_audio import (
 )
 from tactileq.commands.record_map import grid_table
 from tactileq.commands.record_more import NOTHING_MORE
+from tactileq.modeling import InputError, RecordingSet
+from tactileq.rig.capture.coverage import Coverage
+from tactileq.rig.capture.grid import StrokeGrid
+from tactileq.stimuli.planted.drawn import draw_surface
 from tests.refusals import refused
 
 SPEEDS, FORCES = [50.0, 150.0, 250.0, 350.0], [0.5, 1.5, 2.5, 3.5]

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
+from tactileq.app import app
 from tactileq.rig import inventory
 from tactileq.rig.sound import devices
-from tactileq.app import app
 from tests.rig.desk.rig_files import rig_text
 
 

@@ -11,13 +11,13 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from tactileq.commands.session import session
 from tactileq.experiments.sessions.log import read_log
 from tactileq.experiments.sessions.manifest import SessionManifest
 from tactileq.experiments.sessions.people import SessionAborted
 from tactileq.experiments.sessions.surfaces import Surfaces
 from tactileq.experiments.study.study import Study
 from tactileq.modeling import InputError
-from tactileq.commands.session import session
 from tests.experiments.scripted import Ready, Scripted
 from tests.refusals import refused
 from tests.two_surfaces import save_two_surfaces

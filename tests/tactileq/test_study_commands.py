@@ -11,6 +11,8 @@ import typer
 from rich.console import Console
 from typer.testing import CliRunner
 
+from tactileq.commands.study_status import table_of
+from tactileq.commands.study_withdraw import study_dropout, study_withdraw
 from tactileq.experiments.sessions.roster import Roster
 from tactileq.experiments.sessions.status import (
     PersonProgress,
@@ -20,8 +22,6 @@ from tactileq.experiments.sessions.status import (
 )
 from tactileq.experiments.study.study import SHIPPED_STUDY, Study
 from tactileq.modeling import InputError
-from tactileq.commands.study_status import table_of
-from tactileq.commands.study_withdraw import study_dropout, study_withdraw
 from tests.experiments.sessions.enrolling import enrolled
 from tests.refusals import refused
 

@@ -58,7 +58,7 @@ class Copy:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        shutil.copytree(ROOT, folder, ignore=shutil.ignore_patterns(*NOT_COPIED))
+        shutil.copytree(ROOT, folder, ignore=shutil.ignore_patterns(*NOT_COPIED), symlinks=True)
         # Before the installed project, in every process that a test starts.
         own = {"PYTHONPATH": str(folder), "OPENBLAS_NUM_THREADS": "1"}
         # Else git applies a patch to the repository around the copy, if there is one.
@@ -89,7 +89,12 @@ class Copy:
 
     def _require_own_modules(self) -> None:
         """Refuse a copy whose tests would run the installed project."""
-        modules = ("tactileq.modeling.rendering._kernel", "tactileq.rig.live._live", "tactileq.app", "tests.conftest")
+        modules = (
+            "tactileq.modeling.rendering._kernel",
+            "tactileq.rig.live._live",
+            "tactileq.app",
+            "tests.conftest",
+        )
         told = "; ".join(f"import {name} as m; print(m.__file__)" for name in modules)
         for file in self._run(sys.executable, "-c", told).split():
             if not Path(file).is_relative_to(self.folder):

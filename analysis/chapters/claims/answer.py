@@ -20,7 +20,12 @@ from tactileq.analysis.statistics.caveats import (
     WITHOUT_EQUALITY,
 )
 from tactileq.analysis.statistics.claims import NO_TEST
-from tactileq.analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE, WITHIN_BOUNDS
+from tactileq.analysis.statistics.equivalence import (
+    DIFFERENT,
+    EQUIVALENT,
+    INCONCLUSIVE,
+    WITHIN_BOUNDS,
+)
 from tactileq.analysis.statistics.verdicts import ClaimFound, overall_row
 
 WORDS = {

@@ -12,7 +12,14 @@ from tactileq.analysis.chapters.claims.people_sentences import (
     doubled_priors,
     texture_effect,
 )
-from tactileq.analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES, sentence_case, signed, unit_of
+from tactileq.analysis.labels import (
+    ALL_TEXTURES,
+    IDENTICAL,
+    MEASURES,
+    sentence_case,
+    signed,
+    unit_of,
+)
 from tactileq.analysis.page.outcomes import Outcome, Weight
 from tactileq.analysis.statistics.caveats import DIFFERENCES, INTERIM, WITHOUT_EQUALITY
 from tactileq.analysis.statistics.claims import CONTROL, NO_TEST, all_equivalent

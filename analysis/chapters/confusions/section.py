@@ -12,7 +12,11 @@ import numpy as np
 import pandas as pd
 
 from tactileq.analysis.chapters.chapter import Answered, Stream
-from tactileq.analysis.chapters.confusions.buttons import BUTTON_COLUMNS, ButtonPreference, button_preference
+from tactileq.analysis.chapters.confusions.buttons import (
+    BUTTON_COLUMNS,
+    ButtonPreference,
+    button_preference,
+)
 from tactileq.analysis.chapters.confusions.change import confusion_change_p
 from tactileq.analysis.chapters.confusions.figure import figure_confusion, figure_similarities
 from tactileq.analysis.chapters.confusions.information import transferred_information

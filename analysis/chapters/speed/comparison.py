@@ -10,7 +10,11 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from tactileq.analysis.chapters.speed.scores import judged_with_all, participant_scores, timed_answers
+from tactileq.analysis.chapters.speed.scores import (
+    judged_with_all,
+    participant_scores,
+    timed_answers,
+)
 from tactileq.analysis.columns import MODEL, P
 from tactileq.analysis.statistics.mixed import mixed_effects
 from tactileq.analysis.statistics.paired import (
@@ -171,7 +175,8 @@ def time_ratios(
     Returns
     -------
     DataFrame
-        `TIME_RATIO_COLUMNS`, a row for each term of `tactileq.analysis.statistics.mixed.mixed_effects`.
+        `TIME_RATIO_COLUMNS`, a row for each term of
+        `tactileq.analysis.statistics.mixed.mixed_effects`.
     """
     own = judged_with_all(answers, models)
     logs = own.assign(log_time=np.log(own["response_time_s"]))

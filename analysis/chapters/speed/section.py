@@ -20,7 +20,10 @@ from tactileq.analysis.chapters.speed.comparison import (
     right_and_wrong,
     time_ratios,
 )
-from tactileq.analysis.chapters.speed.figure import figure_conditional_accuracy, figure_speed_accuracy
+from tactileq.analysis.chapters.speed.figure import (
+    figure_conditional_accuracy,
+    figure_speed_accuracy,
+)
 from tactileq.analysis.chapters.speed.scores import (
     CONDITIONAL_COLUMNS,
     SCORE_COLUMNS,

@@ -29,7 +29,11 @@ from tactileq.analysis.figures.confusions import plot_confusion
 from tactileq.analysis.page.outcomes import Outcome, Weight
 from tactileq.analysis.page.page import Fold, Picture, Table
 from tactileq.analysis.page.sections import Headline, Section
-from tactileq.analysis.statistics.confusion import CONFUSION_COLUMNS, ConfusionMatrix, confusion_table
+from tactileq.analysis.statistics.confusion import (
+    CONFUSION_COLUMNS,
+    ConfusionMatrix,
+    confusion_table,
+)
 from tactileq.modeling.errors import counted
 from tactileq.modeling.files.columns import p_value
 

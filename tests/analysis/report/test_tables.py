@@ -45,7 +45,11 @@ from tactileq.analysis.chapters.single_answers.section import (
 )
 from tactileq.analysis.chapters.speed.comparison import RIGHT_WRONG_COLUMNS, TIME_RATIO_COLUMNS
 from tactileq.analysis.chapters.speed.comparison import SPEED_COMPARISON_COLUMNS as SPEED_COLUMNS
-from tactileq.analysis.chapters.speed.scores import CONDITIONAL_COLUMNS, SCORE_COLUMNS, TEXTURE_TIME_COLUMNS
+from tactileq.analysis.chapters.speed.scores import (
+    CONDITIONAL_COLUMNS,
+    SCORE_COLUMNS,
+    TEXTURE_TIME_COLUMNS,
+)
 from tactileq.analysis.chapters.speed.section import speed_accuracy_section
 from tactileq.analysis.columns import TEXTURE
 from tactileq.analysis.labels import ALL_TEXTURES

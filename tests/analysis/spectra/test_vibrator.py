@@ -9,7 +9,11 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from tactileq.analysis.spectra.figures.vibrator import figure_vibrator, plot_coherence, plot_compensation
+from tactileq.analysis.spectra.figures.vibrator import (
+    figure_vibrator,
+    plot_coherence,
+    plot_compensation,
+)
 from tactileq.analysis.spectra.vibrator import CompensatedVibrator, compensated
 from tactileq.modeling import Vibrator, compensation_for
 from tactileq.stimuli.planted.vibrators import SimulatedVibrator

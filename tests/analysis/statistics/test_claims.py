@@ -29,7 +29,12 @@ from tactileq.analysis.statistics.claims import (
     complete_means,
     share_at_ends,
 )
-from tactileq.analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE, WITHIN_BOUNDS
+from tactileq.analysis.statistics.equivalence import (
+    DIFFERENT,
+    EQUIVALENT,
+    INCONCLUSIVE,
+    WITHIN_BOUNDS,
+)
 from tactileq.analysis.statistics.paired import holm
 from tactileq.modeling.files.columns import names
 

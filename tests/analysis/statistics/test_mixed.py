@@ -12,7 +12,13 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.optimize import minimize
 
-from tactileq.analysis.statistics.design import MODEL_EFFECT, ORDER, SESSION, complete_participants, design
+from tactileq.analysis.statistics.design import (
+    MODEL_EFFECT,
+    ORDER,
+    SESSION,
+    complete_participants,
+    design,
+)
 from tactileq.analysis.statistics.mixed import (
     MIXED_COLUMNS,
     MIXED_MODEL,

@@ -17,7 +17,12 @@ from numpy.testing import assert_allclose
 from tactileq.analysis.statistics.participants.choices import ChoiceSampler
 from tactileq.analysis.statistics.participants.ratings import RatingSampler
 from tactileq.modeling.arrays import Floats
-from tactileq.modeling.participants.choices import ODDITY, ChoicePriors, ChoiceStudies, forced_choice
+from tactileq.modeling.participants.choices import (
+    ODDITY,
+    ChoicePriors,
+    ChoiceStudies,
+    forced_choice,
+)
 from tactileq.modeling.participants.effects import EffectPriors
 from tactileq.modeling.participants.ratings import RatingPriors, RatingStudies
 

@@ -25,8 +25,17 @@ from tactileq.analysis.statistics.caveats import (
     SHOWN,
     WITHHELD,
 )
-from tactileq.analysis.statistics.compared_answers import all_claims, chance_of, claim_values, pairs_of
-from tactileq.analysis.statistics.described_verdicts import check_complete, incomplete, planted_verdicts
+from tactileq.analysis.statistics.compared_answers import (
+    all_claims,
+    chance_of,
+    claim_values,
+    pairs_of,
+)
+from tactileq.analysis.statistics.described_verdicts import (
+    check_complete,
+    incomplete,
+    planted_verdicts,
+)
 from tactileq.analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, WITHIN_BOUNDS
 from tactileq.analysis.statistics.verdicts import ClaimFound, claim_caveats, claims_found
 from tactileq.modeling import InputError

@@ -26,7 +26,13 @@ from tactileq.benches.chart.rival_fits import Filtered, Grained, Looped, Shaped
 from tactileq.benches.chart.shaped_noise import ShapedNoise
 from tactileq.benches.rendering.accuracy import stroke
 from tactileq.benches.rendering.coefficients import BandTable, tabled_bands
-from tactileq.benches.rendering.rivals import BANDS, COEFFICIENTS, CompiledStream, SoundStream, predictor_of
+from tactileq.benches.rendering.rivals import (
+    BANDS,
+    COEFFICIENTS,
+    CompiledStream,
+    SoundStream,
+    predictor_of,
+)
 from tactileq.benches.rendering.stored_sounds import Grains, Loops
 from tactileq.modeling import regressed, render_many
 from tactileq.modeling.hand import Hand

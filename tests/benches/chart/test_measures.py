@@ -7,7 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactileq.benches.chart.measures import Accuracy, ReferenceMagnitude, frequencies_hz, over_conditions
+from tactileq.benches.chart.measures import (
+    Accuracy,
+    ReferenceMagnitude,
+    frequencies_hz,
+    over_conditions,
+)
 from tactileq.modeling import PEQ
 
 TRUTH = PEQ(

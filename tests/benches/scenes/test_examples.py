@@ -24,7 +24,12 @@ from tactileq.modeling import Scene, compile_scene, fit_ar
 from tactileq.modeling.scenes.hands import HandRange
 from tactileq.modeling.scenes.places import places_of
 from tactileq.modeling.scenes.strokes import windows_kept
-from tactileq.stimuli.planted.textures import TEXTURES, PlantedSurface, planted_texture, record_texture
+from tactileq.stimuli.planted.textures import (
+    TEXTURES,
+    PlantedSurface,
+    planted_texture,
+    record_texture,
+)
 
 
 def test_the_scenes_that_ship_are_those_that_the_report_shows() -> None:

@@ -11,7 +11,12 @@ import pytest
 from scipy import stats
 
 from tactileq.experiments.observers.percepts import Perception, distance, sensation_levels
-from tactileq.experiments.observers.psychometrics import RATED_SCALES, Psychometrics, Trait, choice_shares
+from tactileq.experiments.observers.psychometrics import (
+    RATED_SCALES,
+    Psychometrics,
+    Trait,
+    choice_shares,
+)
 from tactileq.experiments.observers.simulated import SimulatedParticipant, require_plantable
 from tactileq.experiments.sessions.people import Intake
 from tactileq.experiments.sessions.surfaces import Surfaces

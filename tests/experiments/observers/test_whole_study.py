@@ -7,7 +7,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from tactileq.experiments import Study, simulate_study
+from tactileq import Study, simulate_study
 from tactileq.experiments.observers.in_memory import simulate_sessions
 from tactileq.experiments.observers.percepts import Perception
 from tactileq.experiments.observers.psychometrics import Psychometrics

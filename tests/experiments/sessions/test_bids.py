@@ -17,6 +17,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tactileq.bids_validator import bids_issues
 from tactileq.experiments.observers.whole_study import simulate_study
 from tactileq.experiments.sessions.bids import (
     Exported,
@@ -41,7 +42,6 @@ from tactileq.modeling.files.answer_tables import ANSWER_TABLES
 from tactileq.modeling.files.columns import Column
 from tactileq.modeling.files.tables import guarded
 from tactileq.rig.twin import SimulatedRig
-from tactileq.bids_validator import bids_issues
 from tests.experiments.sessions.conftest import STUDY, session_on_disk
 from tests.refusals import refused
 

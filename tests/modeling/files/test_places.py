@@ -17,7 +17,12 @@ import pytest
 
 from tactileq.modeling.files import places
 from tactileq.modeling.files.folders import check_replaceable, replace_folder
-from tactileq.modeling.files.places import clear_unfinished, locked, unfinished_file, unfinished_folder
+from tactileq.modeling.files.places import (
+    clear_unfinished,
+    locked,
+    unfinished_file,
+    unfinished_folder,
+)
 from tactileq.modeling.files.writing import write_bytes, write_files, write_text
 
 fork = multiprocessing.get_context("fork")

@@ -13,7 +13,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import ndtr
 
-from tactileq.modeling import CRITERIA, InputError, Simplification, TextureModel, Threshold, simplify
+from tactileq.modeling import (
+    CRITERIA,
+    InputError,
+    Simplification,
+    TextureModel,
+    Threshold,
+    simplify,
+)
 from tactileq.modeling.perception.amplitudes import layer_amplitudes_g
 from tactileq.modeling.perception.signs_of_rest import with_signs_chosen_again
 from tactileq.modeling.perception.simplification import distances_db

@@ -10,7 +10,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from tactileq.modeling import InputError, Threshold
-from tactileq.modeling.perception.thresholds import LEVELS_G, SHIPPED, displacement_to_acceleration_g
+from tactileq.modeling.perception.thresholds import (
+    LEVELS_G,
+    SHIPPED,
+    displacement_to_acceleration_g,
+)
 from tests.refusals import refused
 
 

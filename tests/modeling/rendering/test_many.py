@@ -14,7 +14,15 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import tactileq.modeling.rendering.many
-from tactileq.modeling import ARModel, InputError, Limits, Renderer, TextureModel, regressed, render_many
+from tactileq.modeling import (
+    ARModel,
+    InputError,
+    Limits,
+    Renderer,
+    TextureModel,
+    regressed,
+    render_many,
+)
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.engines import SWITCH
 from tactileq.modeling.hand import Hand

@@ -11,7 +11,16 @@ import pytest
 
 from tactileq.rig.desk.journal import Journal, Played
 from tactileq.rig.interface import SURFACES
-from tactileq.rig.live.memory import BLOCK, BUTTON, CONTACT, FORCE_ASSUMED, GONE, STALE, UNDERFLOW, Live
+from tactileq.rig.live.memory import (
+    BLOCK,
+    BUTTON,
+    CONTACT,
+    FORCE_ASSUMED,
+    GONE,
+    STALE,
+    UNDERFLOW,
+    Live,
+)
 
 OPENED_S = 1000.0
 

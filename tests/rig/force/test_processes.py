@@ -28,7 +28,15 @@ from tactileq.rig.force.states import SENTENCES, Cause, State
 from tactileq.rig.force.wall import Wall
 from tactileq.rig.hand.settings import HandSettings
 from tactileq.rig.live.clock import now_s, sleep, taking_part
-from tactileq.rig.live.memory import BUTTON, CONTACT, FORCE_COMMANDED, GONE, HEARTBEAT_S, SIMULATED, Live
+from tactileq.rig.live.memory import (
+    BUTTON,
+    CONTACT,
+    FORCE_COMMANDED,
+    GONE,
+    HEARTBEAT_S,
+    SIMULATED,
+    Live,
+)
 from tactileq.stimuli.planted.textures import planted_texture
 from tests.rig.force.rig_files import force_rig
 from tests.rig.waiting import follow, wait_until

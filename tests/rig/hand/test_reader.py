@@ -58,11 +58,11 @@ def test_a_held_hand_is_read_with_its_speed_and_force(live: Live) -> None:
     assert abs(rows["time_s"][-1] - now_s()) < 20
 
 
-def test_files_named_as_rooms_in_the_working_folder_do_no_harm(
+def test_files_named_as_libraries_in_the_working_folder_do_no_harm(
     live: Live, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for room in ("rig", "modeling"):
-        (tmp_path / f"{room}.py").write_text("raise ValueError('not this one')\n")
+    for name in ("tactileq", "numpy"):
+        (tmp_path / f"{name}.py").write_text("raise ValueError('not this one')\n")
     monkeypatch.chdir(tmp_path)
     with HandReader(live, HOLD):
         wait_until(lambda: moves(live))

@@ -14,7 +14,13 @@ from scipy.signal import welch
 
 from tactileq.modeling import InputError, RecordingSet
 from tactileq.rig.importing.csv_columns import parse_columns
-from tactileq.rig.importing.files import import_csv, import_csv_file, import_wav, import_wav_file, usable
+from tactileq.rig.importing.files import (
+    import_csv,
+    import_csv_file,
+    import_wav,
+    import_wav_file,
+    usable,
+)
 from tactileq.rig.importing.labels import Label, labels_from_table
 from tests.refusals import check_refusal, refused
 

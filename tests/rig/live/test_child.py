@@ -170,25 +170,25 @@ def test_one_that_does_not_end_is_killed(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_its_rooms_are_those_of_its_parent_though_not_installed_and_though_files_have_their_names(
     tmp_path: Path,
 ) -> None:
-    """A copy of the rooms, found by the parent's path alone; the working folder has a rig.py."""
+    """A copy of the rooms, found by the parent's path alone; the working folder has a numpy.py."""
     house, work = tmp_path / "house", tmp_path / "work"
-    for room in ("modeling", "rig/live"):
-        kept_out = shutil.ignore_patterns("__pycache__", "[a-z]*")  # but __init__.py
-        shutil.copytree(ROOT / room, house / room, ignore=kept_out)
-    names = ["rig/__init__"]
-    names += [f"rig/live/{name}" for name in ("child", "clock", "compiled", "driven", "messages")]
-    for file in (f"{name}.py" for name in (*names, "modeling/face", "modeling/errors")):
+    names = [f"rig/live/{name}" for name in ("child", "clock", "compiled", "driven", "messages")]
+    names += ["__init__", "rig/__init__", "rig/live/__init__"]
+    names += [f"modeling/{name}" for name in ("__init__", "face", "errors")]
+    for file in (f"tactileq/{name}.py" for name in names):
+        (house / file).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / file, house / file)
-    (house / "rig/telling.py").write_text(
-        "import tactileq.modeling.errors\nfrom tactileq.rig.live.driven import Parent\n"
+    (house / "tactileq/rig/telling.py").write_text(
+        "import tactileq.modeling.errors, numpy\nfrom tactileq.rig.live.driven import Parent\n"
         "raise SystemExit(tactileq.modeling.errors.__file__)\n"
     )
     work.mkdir()
-    for room in ("rig", "modeling"):
-        (work / f"{room}.py").write_text("raise SystemExit('not this one')\n")
+    for name in ("tactileq", "numpy"):
+        (work / f"{name}.py").write_text("raise SystemExit('not this one')\n")
     program = (
-        f"import sys; sys.path.insert(0, {str(house)!r}); from tactileq.rig.live.child import Child; "
-        "child = Child('rig.telling', None); print(child.end()); child.close()"
+        f"import sys; sys.path.insert(0, {str(house)!r})\n"
+        "from tactileq.rig.live.child import Child\n"
+        "child = Child('tactileq.rig.telling', None); print(child.end()); child.close()"
     )
     told = subprocess.run(
         [sys.executable, "-P", "-c", program],
@@ -197,7 +197,7 @@ def test_its_rooms_are_those_of_its_parent_though_not_installed_and_though_files
         capture_output=True,
         text=True,
     )
-    assert f"({house / 'modeling/errors.py'})" in told.stdout, told.stderr
+    assert f"({house / 'tactileq/modeling/errors.py'})" in told.stdout, told.stderr
 
 
 def test_a_suspended_process_does_not_hold_up_who_sends_it_a_long_message(

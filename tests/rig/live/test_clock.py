@@ -17,7 +17,15 @@ from tactileq.modeling import InputError
 from tactileq.rig.force.hand import ForceHand
 from tactileq.rig.force.settings import ForceSettings
 from tactileq.rig.hand.settings import HandSettings
-from tactileq.rig.live.clock import GivenClock, next_of, now_s, readable, sleep, taking_part, wait_for
+from tactileq.rig.live.clock import (
+    GivenClock,
+    next_of,
+    now_s,
+    readable,
+    sleep,
+    taking_part,
+    wait_for,
+)
 from tactileq.rig.live.memory import Live
 from tests.refusals import refused
 
@@ -134,7 +142,11 @@ def test_what_waits_for_an_event_a_queue_or_bytes_waits_by_it(clock: GivenClock)
 
 
 def test_it_is_the_same_in_a_process_that_is_started_and_ends_with_the_block() -> None:
-    command = [sys.executable, "-c", "from tactileq.rig.live.clock import is_given; print(is_given())"]
+    command = [
+        sys.executable,
+        "-c",
+        "from tactileq.rig.live.clock import is_given; print(is_given())",
+    ]
     with GivenClock() as given:
         assert subprocess.run(command, capture_output=True, check=True).stdout == b"True\n"
     assert not given.path.exists()

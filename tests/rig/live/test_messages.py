@@ -29,7 +29,7 @@ from tests.refusals import refused
 
 UNIONS = (sound.Request, hand.Report, pen.Request)
 KINDS = sorted(
-    (kind for kind in Message.__subclasses__() if kind.__module__.startswith("rig.")),
+    (kind for kind in Message.__subclasses__() if kind.__module__.startswith("tactileq.rig.")),
     key=lambda kind: f"{kind.__module__} {kind.__name__}",
 )
 # Of settings that check themselves, some that are accepted.

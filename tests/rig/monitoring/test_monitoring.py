@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 
 from tactileq.rig.live.child import Child
-from tactileq.rig.live.memory import BLOCK, CONTACT, FORCE_ASSUMED, GONE, STALE, UNDERFLOW, Live, Rows
+from tactileq.rig.live.memory import (
+    BLOCK,
+    CONTACT,
+    FORCE_ASSUMED,
+    GONE,
+    STALE,
+    UNDERFLOW,
+    Live,
+    Rows,
+)
 from tactileq.rig.live.messages import Done
 from tactileq.rig.monitoring.bare_thread import BareThread, Look, WakeUps
 from tactileq.rig.monitoring.figures import Monitor

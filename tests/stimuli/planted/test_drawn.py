@@ -15,7 +15,13 @@ import tactileq.stimuli.planted
 from tactileq.analysis.textures.between import halfway, truth_summary
 from tactileq.modeling import InputError, fit_ar, fit_texture
 from tactileq.modeling.recordings.spectrum import spectrum
-from tactileq.stimuli.planted.drawn import FORCES_N, RATE_HZ, SPEEDS_MM_S, alter_surface, draw_surface
+from tactileq.stimuli.planted.drawn import (
+    FORCES_N,
+    RATE_HZ,
+    SPEEDS_MM_S,
+    alter_surface,
+    draw_surface,
+)
 from tests.refusals import refused
 
 FREQUENCY_HZ = np.arange(15.0, 481.0)

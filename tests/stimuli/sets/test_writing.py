@@ -146,7 +146,8 @@ def test_set_is_reproducible_to_the_bit_from_its_own_recipe(
     write_set(tmp_path / "c", Recipe.load(tmp_path / "moved/recipe.toml"))
     assert contents(tmp_path / "c") == first
     program = (
-        "from tactileq.stimuli.sets.recipe import Recipe\nfrom tactileq.stimuli.sets.writing import write_set\n"
+        "from tactileq.stimuli.sets.recipe import Recipe\n"
+        "from tactileq.stimuli.sets.writing import write_set\n"
         "write_set('d', Recipe.load('moved/recipe.toml'))\n"
     )
     subprocess.run([sys.executable, "-c", program], cwd=tmp_path, check=True)

@@ -12,7 +12,13 @@ from tactileq.analysis.answers.plan import MODEL_RULE
 from tactileq.analysis.answers.responses import PlannedTask, Responses
 from tactileq.analysis.chapters.claims.answer import answer
 from tactileq.analysis.chapters.claims.model_sentences import decided_by_tests
-from tactileq.analysis.chapters.claims.people import DOUBLED, OWN, people_items, people_table, priors_table
+from tactileq.analysis.chapters.claims.people import (
+    DOUBLED,
+    OWN,
+    people_items,
+    people_table,
+    priors_table,
+)
 from tactileq.analysis.chapters.claims.people_sentences import FEEL_IT, about, headline
 from tactileq.analysis.chapters.claims.plan_sentences import deviations, methods_paragraph
 from tactileq.analysis.chapters.claims.section import sections

@@ -8,7 +8,13 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import special, stats
 
-from tactileq.analysis.chapters.single_answers.gee import GEE, GEE_COLUMNS, SIGN_FLIPS, fit_gee, gee_effects
+from tactileq.analysis.chapters.single_answers.gee import (
+    GEE,
+    GEE_COLUMNS,
+    SIGN_FLIPS,
+    fit_gee,
+    gee_effects,
+)
 from tactileq.analysis.labels import ALL_TEXTURES
 from tactileq.analysis.statistics.design import design
 from tactileq.modeling.files.columns import names

@@ -9,8 +9,15 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
-from tactileq.analysis.chapters.speed.figure import figure_conditional_accuracy, figure_speed_accuracy
-from tactileq.analysis.chapters.speed.scores import conditional_accuracy, participant_scores, score_means
+from tactileq.analysis.chapters.speed.figure import (
+    figure_conditional_accuracy,
+    figure_speed_accuracy,
+)
+from tactileq.analysis.chapters.speed.scores import (
+    conditional_accuracy,
+    participant_scores,
+    score_means,
+)
 from tactileq.analysis.figures.answers import ROLE_COLOURS
 
 MODELS = ("full", "simplified")

@@ -12,7 +12,12 @@ from tactileq.analysis.statistics.participants.design import (
     rating_studies,
 )
 from tactileq.analysis.statistics.participants.mixture import MixtureOfEffects, vague_mean
-from tactileq.analysis.statistics.participants.posterior import Draws, Effort, choice_draws, rating_draws
+from tactileq.analysis.statistics.participants.posterior import (
+    Draws,
+    Effort,
+    choice_draws,
+    rating_draws,
+)
 from tactileq.analysis.statistics.participants.verdict import summary_of
 from tactileq.modeling.participants.choices import ODDITY, ChoiceStudies, oddity_share
 from tactileq.modeling.participants.effects import EffectPriors
