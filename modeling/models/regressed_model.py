@@ -29,7 +29,7 @@ _LAYERS = "coefficients layers"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RegressedModel(SavedModel):
-    """Coefficients of every PEQ parameter of one texture with m layers, from `regressed`.
+    """Coefficients of every PEQ parameter of one texture with m layers, from `tactileq.regressed`.
 
     With driven_by="conditions" every parameter is β + α1·v + α2·F + α3·v·F (eq. 3), k = 4; with
     "centroid" it is p0 + p1·SC(v), k = 2, and SC(v) = c0 + c1·v. What a reduced model leaves out

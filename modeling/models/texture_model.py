@@ -73,7 +73,7 @@ class TextureModel(SavedModel):
         Bools, key("frequency taken over from the reference condition", shape=_LAYERS)
     ] = field(default_factory=no_marks)
     unresolved: Annotated[
-        Bools, key("width or level not resolved (see `tactileq.modeling.Layers`)", shape=_LAYERS)
+        Bools, key("width or level not resolved (see `tactileq.Layers`)", shape=_LAYERS)
     ] = field(default_factory=no_marks)
     interpolated: Annotated[
         Bools,

@@ -231,7 +231,7 @@ def test_ratings_of_another_task_are_told_apart_from_those_of_the_first(tmp_path
 def test_every_task_has_a_chapter_by_what_it_declares():
     """The paper's two, the odd one out, and a threshold, which is only counted."""
     by_chapter = {
-        chapter.__name__.split(".")[2]: [
+        chapter.__name__.split(".")[3]: [
             t for t, own in ANSWER_TABLES.items() if chapter.applies(own)
         ]
         for chapter in (ratings_chapter, choices_chapter, oddity_chapter, tasks_chapter)
