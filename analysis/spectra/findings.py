@@ -87,7 +87,7 @@ def find_in(
     records : RecordingSet
         Of one texture.
     estimator, layers
-        As in `tactileq.modeling.fit_texture`.
+        As in `tactileq.fit_texture`.
     keep_hum : bool
         As in `tactileq.modeling.fitting.conditions.recording_spectra`.
     check : bool
@@ -98,7 +98,7 @@ def find_in(
     Raises
     ------
     InputError
-        For records that cannot be used, as in `tactileq.modeling.fit_texture`.
+        For records that cannot be used, as in `tactileq.fit_texture`.
     """
     only_unit(records)
     measured = recording_spectra(records, keep_hum=keep_hum)

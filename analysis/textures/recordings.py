@@ -34,7 +34,7 @@ def layers_of_recordings(
     measured : sequence of (Recording, Spectrum)
         From `tactileq.modeling.fitting.conditions.recording_spectra`.
     estimator : str
-        As in `tactileq.modeling.fit_texture`.
+        As in `tactileq.fit_texture`.
     """
     return tuple(
         RecordingLayers(recording, found, find_layers(found, estimator=estimator))

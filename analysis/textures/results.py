@@ -108,7 +108,7 @@ def simplification_table(simplification: Simplification) -> pd.DataFrame:
         texture, layer (1-based), verdict (kept|dropped), reason, worst_speed_mm_s, worst_force_n,
         worst_frequency_hz (the condition where what decides is highest against the threshold),
         distance_db (to the threshold there, + above), flip_probability (0–1), assumed and fills
-        (as in `tactileq.modeling.LayerVerdict`), simulated, full_sha256 and threshold_sha256.
+        (as in `tactileq.LayerVerdict`), simulated, full_sha256 and threshold_sha256.
     """
     columns = [each.name for each in fields(LayerVerdict)]
     table = pd.DataFrame([asdict(v) for v in simplification.layers], columns=columns)

@@ -76,7 +76,7 @@ class Now(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class FeltCriterion:
-    """The criterion for whether a layer is felt, as in `tactileq.modeling.simplify`."""
+    """The criterion for whether a layer is felt, as in `tactileq.simplify`."""
 
     threshold: Threshold
     criterion: CriterionName = "energy"

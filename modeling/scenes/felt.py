@@ -26,7 +26,7 @@ def kept_layers(
 ) -> list[tuple[int, ...]]:
     """Every choice of layers to keep that drops nothing that is felt, smallest first.
 
-    As `tactileq.modeling.simplify` decides by `energy`, at the places of the scene instead of the
+    As `tactileq.simplify` decides by `energy`, at the places of the scene instead of the
     whole grid, and of what the actuator plays. Of several choices of one size the one that changes
     least comes first.
 

@@ -125,7 +125,7 @@ def export_c_header(
 ) -> None:
     """Write a model and the kernel as one C header, with provenance.
 
-    `limits` are those of `tactileq.modeling.Limits`, None for none.
+    `limits` are those of `tactileq.Limits`, None for none.
     """
     from tactileq.modeling import Limits, Vibrator, compensation_for
     from tactileq.modeling.files.hashes import sha256_of_paths
