@@ -1,6 +1,6 @@
 # make demo    the whole study in silico, ends with the path of its report
 # make test    style, types, import rules, and what a change can break by mistake
-# make test-long   the long tests, other random examples, then the planted bugs; ROOM=rig/device: of one room
+# make test-long   the long tests, other random examples, then the planted bugs; ROOM=rig/machines/device: of one room
 # make test-core   the tests that need no extra, with every Python from 3.11 to 3.14 that is there
 # make quick ROOM=modeling/fitting   only the tests of one room
 # make bench   time the modeling and its rivals, and how late this machine is

@@ -27,7 +27,7 @@ from hypothesis import settings
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from tactileq.rig.live.clock import GivenClock
+from tactileq.rig.shared.live.clock import GivenClock
 from tests.audio_lock import LockWatch
 from tests.extras import ROOT, is_to_collect, not_collected, skip_what_lacks_packages
 from tests.selection import holds_tests, is_chosen, uses_audio_server

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.kept.manifest import SessionManifest
 from tactileq.modeling.files.described_json import DescribedJson
 from tactileq.modeling.models.ar_model import ARModel
 from tactileq.modeling.models.regressed_model import RegressedModel

@@ -38,7 +38,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tactileq.experiments.sessions.task import Task
+from tactileq.experiments.sessions.loop.task import Task
 from tactileq.experiments.study.design import Trial, fisher_yates
 
 

@@ -15,7 +15,7 @@ import pytest
 from scipy.io import wavfile
 
 from tactileq.analysis.answers.loading import load_responses
-from tactileq.experiments.sessions.bids_tables import table_bytes
+from tactileq.experiments.sessions.bids.tables import table_bytes
 from tactileq.experiments.tasks.threshold_table import READ, read_answers
 from tactileq.modeling import InputError, RecordingSet, Threshold
 from tactileq.modeling.files.answer_tables import ANSWER_TABLES, PARTICIPANT_COLUMNS, PARTICIPANT_ID
@@ -34,12 +34,12 @@ from tactileq.modeling.perception.thresholds import THRESHOLD_COLUMNS
 from tactileq.modeling.recordings.recording_set import KNOWN_COLUMNS
 from tactileq.modeling.recordings.trajectory import TRAJECTORY_COLUMNS, load_trajectory
 from tactileq.modeling.scenes.microcontrollers import CONTROLLER_COLUMNS, load_microcontrollers
-from tactileq.rig.capture.grid import StrokeGrid
-from tactileq.rig.capture.pieces import PIECE_COLUMNS, PieceStore, Plan
-from tactileq.rig.hand.scripted import SCRIPT_COLUMNS
-from tactileq.rig.hand.scripted import ScriptedTrajectory as Script
-from tactileq.rig.importing.labels import LABEL_COLUMNS, labels_from_table
-from tactileq.rig.sound.signals import OF_SURFACES, stimuli_of_surfaces
+from tactileq.rig.recording.capture.grid import StrokeGrid
+from tactileq.rig.recording.capture.pieces import PIECE_COLUMNS, PieceStore, Plan
+from tactileq.rig.devices.hand.scripted import SCRIPT_COLUMNS
+from tactileq.rig.devices.hand.scripted import ScriptedTrajectory as Script
+from tactileq.rig.recording.importing.labels import LABEL_COLUMNS, labels_from_table
+from tactileq.rig.devices.sound.signals import OF_SURFACES, stimuli_of_surfaces
 
 Load = Callable[[Path], object]
 ROOT = Path(__file__).parents[1]

@@ -19,8 +19,8 @@ from tactileq.experiments.study.study import Study
 from tactileq.modeling import InputError, Scene
 from tactileq.modeling.files.describing import schema
 from tactileq.modeling.scenes.scene import SceneFile
-from tactileq.rig.recorder.recorder_file import RecorderFile
-from tactileq.rig.setup.rig_file import RigFile
+from tactileq.rig.machines.recorder.recorder_file import RecorderFile
+from tactileq.rig.shared.setup.rig_file import RigFile
 from tactileq.stimuli.planted.vibrators import planted_vibrator
 from tactileq.stimuli.sets.recipe import Recipe
 from tests import saved_files

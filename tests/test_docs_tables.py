@@ -9,7 +9,7 @@ from types import ModuleType
 
 import pytest
 
-from tactileq.commands.schema import DECLARED, declared
+from tactileq.commands.study.schema import DECLARED, declared
 
 ROOT = Path(__file__).parents[1]
 

@@ -161,15 +161,15 @@ def test_the_core_needs_none_of_what_extras_install(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     wire = (
         *(
-            "tactileq.rig.wire.",
-            "tactileq.rig.device.",
-            "tactileq.rig.device_twin",
-            "tactileq.rig.recorder.",
+            "tactileq.rig.shared.wire.",
+            "tactileq.rig.machines.device.",
+            "tactileq.rig.desk.device_twin",
+            "tactileq.rig.machines.recorder.",
         ),
         "tactileq.benches.recorder.",
     )
     assert {name for name in done.stdout.split() if not name.startswith(wire)} <= {
-        "tactileq.rig.hand.serial_sensor",
+        "tactileq.rig.devices.hand.serial_sensor",
         "tactileq.experiments.console.events",
         "tactileq.experiments.feel.plots",
     }

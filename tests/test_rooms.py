@@ -63,26 +63,26 @@ def test_a_circle_would_be_seen(tmp_path: Path) -> None:
     late.write_text(
         "from typing import TYPE_CHECKING\n"
         "if TYPE_CHECKING:\n    from tactileq.modeling import TextureModel\n"
-        "def f():\n    from tactileq.analysis import labels\n    import tactileq.rig.twin\n"
+        "def f():\n    from tactileq.analysis import labels\n    import tactileq.rig.desk.twin\n"
     )
     assert imported_by(late) == {
         "tactileq.modeling.models.texture_model",
         "tactileq.analysis.labels",
-        "tactileq.rig.twin",
+        "tactileq.rig.desk.twin",
     }
 
 
 # A file, what it then imports, and the contract that forbids it.
 PLANTED = {
     "modeling/models/grid.py": ("tactileq.stimuli.planted.textures", "Data flows one way"),
-    "stimuli/sets/levels.py": ("tactileq.rig.twin", "Data flows one way"),
+    "stimuli/sets/levels.py": ("tactileq.rig.desk.twin", "Data flows one way"),
     "analysis/labels.py": ("tactileq.experiments.study.study", "Data flows one way"),
-    "rig/interface.py": ("tactileq.app", "Data flows one way"),
+    "rig/shared/interface.py": ("tactileq.app", "Data flows one way"),
     "modeling/equalizer/bands.py": ("tactileq.modeling.models.grid", "Floors of modeling"),
     "modeling/fitting/field.py": ("tactileq.modeling.regression.driving", "Floors of modeling"),
     "stimuli/planted/textures.py": ("tactileq.stimuli.sets.recipe", "Floors of stimuli"),
-    "rig/importing/files.py": ("tactileq.rig.twin", "Floors of rig"),
-    "experiments/study/study.py": ("tactileq.experiments.sessions.store", "Floors of experiments"),
+    "rig/recording/importing/files.py": ("tactileq.rig.desk.twin", "Floors of rig"),
+    "experiments/study/study.py": ("tactileq.experiments.sessions.store.interface", "Floors of experiments"),
     "analysis/statistics/holm.py": ("tactileq.analysis.figures.answers", "Floors of analysis"),
     "analysis/spectra/findings.py": ("tactileq.benches.rendering.bench", "Data flows one way"),
     "benches/rendering/clicks.py": ("tactileq.benches.atlas.tables", "Floors of the benches"),
@@ -90,10 +90,10 @@ PLANTED = {
         "tactileq.analysis.chapters.speed.section",
         "A chapter of the report imports no other",
     ),
-    "tactileq/printing.py": ("tactileq.commands.demo", "Data flows one way"),
+    "tactileq/printing.py": ("tactileq.commands.benches.demo", "Data flows one way"),
     "modeling/perception/clock.py": ("time", "modeling is pure numerics"),
     "modeling/hand.py": ("random", "modeling is pure numerics"),
-    "rig/twin.py": ("tests", "Nobody imports tests"),
+    "rig/desk/twin.py": ("tests", "Nobody imports tests"),
     "tactileq/newcomer.py": ("", "Data flows one way"),
     "modeling/newcomer.py": ("", "Floors of modeling"),  # every module has its floor
 }
@@ -179,7 +179,7 @@ def test_help_loads_no_numerics() -> None:
     loaded = loaded_after(
         "from tactileq.app import app\ntry: app(['--help'])\nexcept SystemExit: pass"
     )
-    assert "tactileq.commands.demo" in loaded
+    assert "tactileq.commands.benches.demo" in loaded
     assert not (HEAVY | {"numpy"}) & set(loaded)
 
 

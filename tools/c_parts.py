@@ -3,10 +3,10 @@
 `tactileq.modeling.rendering._kernel` is the rendering kernel, `_kernel_single` the same in single
 precision, `_many` renders many streams side by side, `tactileq.modeling.estimation._slopes` is what
 the fit of layers spends its time on, `tactileq.benches.rendering._rivals` is what the bench
-compares, `tactileq.rig.live._live` is the memory that processes of a rig share, the callback that
-plays and the servo of a force device, `tactileq.rig.force._standin` a stand-in for the library of
-its maker, `tactileq.rig.device._device` the firmware on a simulated board,
-`tactileq.rig.recorder._recorder` the recorder's law on simulated mechanics.
+compares, `tactileq.rig.shared.live._live` is the memory that processes of a rig share, the callback that
+plays and the servo of a force device, `tactileq.rig.machines.force._standin` a stand-in for the library of
+its maker, `tactileq.rig.machines.device._device` the firmware on a simulated board,
+`tactileq.rig.machines.recorder._recorder` the recorder's law on simulated mechanics.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ def live_binding() -> FFI:
         SERVO,
     )
     builder.set_source(
-        "tactileq.rig.live._live",
+        "tactileq.rig.shared.live._live",
         f'#include "{SOUND.name}"\n#include "{SERVO.name}"',
         include_dirs=[str(PLAYER.parent), str(SOUND.parent), str(SERVO.parent)],
         depends=[str(header) for header in headers],
@@ -162,7 +162,7 @@ def standin_binding() -> FFI:
     builder = FFI()
     builder.cdef(declarations(STANDIN))
     builder.set_source(
-        "tactileq.rig.force._standin",
+        "tactileq.rig.machines.force._standin",
         f'#include "{STANDIN.name}"',
         include_dirs=[str(STANDIN.parent), str(LIVE.parent)],
         depends=[str(STANDIN), str(LIVE), str(CLOCK)],
@@ -196,7 +196,7 @@ def device_binding() -> FFI:
     builder.cdef("\n".join((numbers, *mechanics, virtual_board())))
     folders = [DEVICE, FORCE.parent, KERNEL.parent, LIVE.parent]
     builder.set_source(
-        "tactileq.rig.device._device",
+        "tactileq.rig.machines.device._device",
         f'#include "{header.name}"',
         include_dirs=[str(folder) for folder in folders],
         depends=headers_in(folders),
@@ -225,7 +225,7 @@ def recorder_binding() -> FFI:
         )
     )
     builder.set_source(
-        "tactileq.rig.recorder._recorder",
+        "tactileq.rig.machines.recorder._recorder",
         '#include "board.h"',
         include_dirs=[str(folder) for folder in folders],
         depends=headers_in(folders),

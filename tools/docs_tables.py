@@ -17,8 +17,9 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from tactileq.commands.schema import declared  # noqa: E402
-from tactileq.experiments.sessions import bids_events, bids_people, bids_physio, traces  # noqa: E402
+from tactileq.commands.study.schema import declared  # noqa: E402
+from tactileq.experiments.sessions.bids import (events as bids_events, people as bids_people, physio as bids_physio,)
+from tactileq.experiments.sessions.kept import traces  # noqa: E402
 from tactileq.experiments.tasks import threshold_table  # noqa: E402
 from tactileq.modeling.files import answer_tables, stimulus_table  # noqa: E402
 from tactileq.modeling.files.columns import markdown  # noqa: E402
@@ -26,13 +27,13 @@ from tactileq.modeling.files.describing import key_tables, schema_text  # noqa: 
 from tactileq.modeling.perception import thresholds  # noqa: E402
 from tactileq.modeling.recordings import recording_set, trajectory  # noqa: E402
 from tactileq.modeling.scenes import microcontrollers  # noqa: E402
-from tactileq.rig.capture import pieces  # noqa: E402
-from tactileq.rig.device.definition import DEVICE  # noqa: E402
-from tactileq.rig.hand import scripted  # noqa: E402
-from tactileq.rig.importing import labels  # noqa: E402
-from tactileq.rig.recorder import store as recorder_store  # noqa: E402
-from tactileq.rig.recorder.definition import RECORDER  # noqa: E402
-from tactileq.rig.wire import generating  # noqa: E402
+from tactileq.rig.recording.capture import pieces  # noqa: E402
+from tactileq.rig.machines.device.definition import DEVICE  # noqa: E402
+from tactileq.rig.devices.hand import scripted  # noqa: E402
+from tactileq.rig.recording.importing import labels  # noqa: E402
+from tactileq.rig.machines.recorder import store as recorder_store  # noqa: E402
+from tactileq.rig.machines.recorder.definition import RECORDER  # noqa: E402
+from tactileq.rig.shared.wire import generating  # noqa: E402
 
 TABLES = {
     "recordings": recording_set.KNOWN_COLUMNS,
@@ -67,16 +68,16 @@ PAGES = (
 SCHEMAS = {
     "modeling/scenes/shipped/scene.schema.json": "scene",
     "docs/recipe.schema.json": "recipe",
-    "rig/setup/rig.schema.json": "rig",
-    "rig/recorder/recorder.schema.json": "recorder",
+    "rig/shared/setup/rig.schema.json": "rig",
+    "rig/machines/recorder/recorder.schema.json": "recorder",
     "experiments/study/study.schema.json": "study",
 }
 DEVICE_FILES = {
-    "rig/device/registers.h": (generating.c_header, DEVICE),
-    "rig/device/registers.py": (generating.python_module, DEVICE),
+    "rig/machines/device/registers.h": (generating.c_header, DEVICE),
+    "rig/machines/device/registers.py": (generating.python_module, DEVICE),
     "docs/device/vectors.json": (generating.vectors, DEVICE),
-    "rig/recorder/registers.h": (generating.c_header, RECORDER),
-    "rig/recorder/registers.py": (partial(generating.python_module, prefix="Recorder"), RECORDER),
+    "rig/machines/recorder/registers.h": (generating.c_header, RECORDER),
+    "rig/machines/recorder/registers.py": (partial(generating.python_module, prefix="Recorder"), RECORDER),
 }
 _OF_A_DEVICE = {"registers": generating.register_table, "masks": generating.mask_tables}
 _MADE = {

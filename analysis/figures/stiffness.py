@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tactileq.analysis.page.drawing import BLUE, VERMILLION, axes_or_new, stamp_if_simulated
-from tactileq.rig.calibration.stiffness import Pressed
+from tactileq.rig.desk.calibration.stiffness import Pressed
 
 STYLES = (("real surface", VERMILLION, (0, (5, 2))), ("virtual wall", BLUE, "-"))
 

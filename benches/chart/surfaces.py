@@ -21,8 +21,8 @@ from tactileq.modeling.hand import Hand
 from tactileq.modeling.models.grid import Condition, grid_axes
 from tactileq.modeling.models.loading import load_model, models_in
 from tactileq.modeling.recordings.recording_set import load_usable, textures_in
-from tactileq.rig.importing.hatt import HattTexture
-from tactileq.rig.importing.hatt_reader import load_hatt
+from tactileq.rig.recording.importing.hatt import HattTexture
+from tactileq.rig.recording.importing.hatt_reader import load_hatt
 from tactileq.stimuli.planted.drawn import draw_surface
 from tactileq.stimuli.planted.textures import (
     FORCES_N,

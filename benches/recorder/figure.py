@@ -23,7 +23,7 @@ def figure_recorder(records: pd.DataFrame, near: pd.DataFrame) -> Figure:
     Parameters
     ----------
     records : DataFrame
-        `tactileq.rig.recorder.store.RECORDER_COLUMNS`, of a simulated recorder.
+        `tactileq.rig.machines.recorder.store.RECORDER_COLUMNS`, of a simulated recorder.
     near : DataFrame
         `tactileq.benches.recorder.tables.NEAR_COLUMNS`.
     """

@@ -24,7 +24,7 @@ def recorder_section(records: pd.DataFrame, near: pd.DataFrame, hand: pd.DataFra
     Parameters
     ----------
     records : DataFrame
-        `tactileq.rig.recorder.store.RECORDER_COLUMNS` of all textures.
+        `tactileq.rig.machines.recorder.store.RECORDER_COLUMNS` of all textures.
     near : DataFrame
         From `tactileq.benches.recorder.tables.near_table`.
     hand : DataFrame

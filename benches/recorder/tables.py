@@ -13,7 +13,7 @@ from tactileq.analysis.textures.between import Truth, halfway, truth_summary
 from tactileq.modeling import TextureModel
 from tactileq.modeling.files.columns import Column
 from tactileq.modeling.files.tables import read_table
-from tactileq.rig.recorder.store import RECORDER_COLUMNS, TABLE_NAME
+from tactileq.rig.machines.recorder.store import RECORDER_COLUMNS, TABLE_NAME
 
 HIGHEST_HZ, STEP_HZ = 1000.0, 5.0  # over which responses are compared
 LOWEST_HZ = 20.0

@@ -34,9 +34,9 @@ import pandas as pd
 
 from tactileq.modeling.seeds import generator
 from tactileq.rig.desk.desk_rig import DeskRig
-from tactileq.rig.hand.serial_line import SensorLine, encode
-from tactileq.rig.live.clock import now_s
-from tactileq.rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
+from tactileq.rig.devices.hand.serial_line import SensorLine, encode
+from tactileq.rig.shared.live.clock import now_s
+from tactileq.rig.shared.setup.rig_file import SHIPPED_RIG_FILE, RigFile
 from tactileq.stimuli.planted.textures import planted_texture
 
 RATE_HZ, BLOCK = 48000, 128

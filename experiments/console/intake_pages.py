@@ -7,7 +7,7 @@ from functools import partial
 from tactileq.experiments.console.drawing import CARD, CONSOLE_GREY, CONSOLE_ORANGE, PALE, text
 from tactileq.experiments.console.page_runner import PageRunner
 from tactileq.experiments.console.widgets import Button
-from tactileq.experiments.sessions.people import Intake, SessionAborted
+from tactileq.experiments.sessions.loop.people import Intake, SessionAborted
 from tactileq.experiments.study.questions import MOST_DIGITS, MOST_LEVELS, Question
 
 REFUSED = "consent refused"

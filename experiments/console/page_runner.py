@@ -13,8 +13,8 @@ from tactileq.experiments.console.languages import Texts
 from tactileq.experiments.console.page import Page
 from tactileq.experiments.console.parts import PageParts
 from tactileq.experiments.console.widgets import Button, FocusRing, Widget
-from tactileq.experiments.sessions.people import SessionAborted
-from tactileq.experiments.sessions.surfaces import Note, Surfaces
+from tactileq.experiments.sessions.loop.people import SessionAborted
+from tactileq.experiments.sessions.loop.surfaces import Note, Surfaces
 
 # --- Parameters -----------------------------------------------------------------------------
 

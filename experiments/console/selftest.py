@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from tactileq.experiments.console.screens import open_window
-from tactileq.experiments.sessions.surfaces import present
+from tactileq.experiments.sessions.loop.surfaces import present
 from tactileq.modeling import InputError
-from tactileq.rig.interface import Presentable, TextureRig
+from tactileq.rig.shared.interface import Presentable, TextureRig
 
 FLIPS = 240
 PRESSES = 20

@@ -9,9 +9,9 @@ from typing import Any
 from tactileq.experiments.console.drawing import CONSOLE_ORANGE, INK, SMALL_HEIGHT, Point
 from tactileq.experiments.console.page_runner import PageRunner
 from tactileq.experiments.console.widgets import Button, RatingScale
-from tactileq.experiments.sessions.people import Choice, RatedTrial, Rating
-from tactileq.experiments.sessions.surfaces import Surfaces
-from tactileq.experiments.sessions.task import Task
+from tactileq.experiments.sessions.loop.people import Choice, RatedTrial, Rating
+from tactileq.experiments.sessions.loop.surfaces import Surfaces
+from tactileq.experiments.sessions.loop.task import Task
 
 BUTTONS_PER_ROW = 7
 BUTTON_PITCH, ROW_PITCH = 0.15, 0.18

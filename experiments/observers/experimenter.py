@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tactileq.experiments.sessions.people import ProgressReport
+from tactileq.experiments.sessions.loop.people import ProgressReport
 
 
 class SimulatedExperimenter:

@@ -18,7 +18,7 @@ from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import shown
 from tactileq.modeling.models.ar_model import ARModel
 from tactileq.modeling.models.loading import AnyModel
-from tactileq.rig.interface import Presentable, Stimulus
+from tactileq.rig.shared.interface import Presentable, Stimulus
 
 BAND_EDGES_HZ = (10.0, 20.0, 35.0, 60.0, 90.0, 130.0, 180.0, 250.0, 350.0, 480.0)
 STROKES = ((100.0, 1.0), (200.0, 1.5), (300.0, 2.5))  # (mm/s, N)

@@ -13,15 +13,15 @@ from tactileq.experiments.observers.simulated import (
     occasion_of,
     require_plantable,
 )
-from tactileq.experiments.sessions.bids import export_all
-from tactileq.experiments.sessions.running import Circumstances, run_session
-from tactileq.experiments.sessions.trial_loop import People, SessionResult
+from tactileq.experiments.sessions.bids.export import export_all
+from tactileq.experiments.sessions.loop.running import Circumstances, run_session
+from tactileq.experiments.sessions.loop.trial_loop import People, SessionResult
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.study import Study
 from tactileq.experiments.tasks import task_named
 from tactileq.modeling import TextureModel, Threshold
 from tactileq.modeling.checks import check_whole
-from tactileq.rig.interface import TextureRig
+from tactileq.rig.shared.interface import TextureRig
 
 Progress = Callable[[int, int, str], None]
 

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tactileq.experiments.sessions.files import sessions_in
-from tactileq.experiments.sessions.stored_sessions import held_session
-from tactileq.experiments.sessions.trace_rows import hand_rows, presentation_rows
-from tactileq.experiments.sessions.traces import HAND_COLUMNS
+from tactileq.experiments.sessions.kept.files import sessions_in
+from tactileq.experiments.sessions.kept.stored_sessions import held_session
+from tactileq.experiments.sessions.kept.trace_rows import hand_rows, presentation_rows
+from tactileq.experiments.sessions.kept.traces import HAND_COLUMNS
 from tactileq.modeling import InputError, Renderer
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import shown

@@ -12,11 +12,11 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from tactileq.experiments.sessions.bids import export_all
-from tactileq.experiments.sessions.data_set import DESCRIPTION_NAME
-from tactileq.experiments.sessions.log import Event, object_of, sealed_line, utc_text
-from tactileq.experiments.sessions.roster import Roster, sealed_roster_line
-from tactileq.experiments.sessions.stored_sessions import StoredSession, held_sessions
+from tactileq.experiments.sessions.bids.export import export_all
+from tactileq.experiments.sessions.kept.data_set import DESCRIPTION_NAME
+from tactileq.experiments.sessions.kept.log import Event, object_of, sealed_line, utc_text
+from tactileq.experiments.sessions.kept.roster import Roster, sealed_roster_line
+from tactileq.experiments.sessions.kept.stored_sessions import StoredSession, held_sessions
 from tactileq.modeling import InputError
 from tactileq.modeling.files.documents import dump_json, read_json_object
 from tactileq.modeling.files.hashes import sha256_of_paths

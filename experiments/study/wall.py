@@ -10,7 +10,7 @@ from tactileq.modeling import InputError
 from tactileq.modeling.checks import check_keys
 from tactileq.modeling.files.described import FileSection, key
 from tactileq.modeling.files.kinds import Label, is_different
-from tactileq.rig.force.wall import LARGEST_MM, STIFFEST_N_PER_MM, Wall
+from tactileq.rig.machines.force.wall import LARGEST_MM, STIFFEST_N_PER_MM, Wall
 
 Height = Annotated[
     float, key("above the origin of the rig's pose", unit="mm", ge=-LARGEST_MM, le=LARGEST_MM)

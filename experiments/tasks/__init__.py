@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from tactileq.experiments.sessions.order import draw_session
-from tactileq.experiments.sessions.task import Task
+from tactileq.experiments.sessions.loop.order import draw_session
+from tactileq.experiments.sessions.loop.task import Task
 from tactileq.experiments.study.design import SessionPlan
 from tactileq.experiments.study.study import Study
 from tactileq.modeling import InputError

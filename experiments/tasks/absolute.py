@@ -11,12 +11,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from tactileq.experiments.sessions.people import Respondent
-from tactileq.experiments.sessions.surfaces import Surfaces
-from tactileq.experiments.sessions.task import Task
+from tactileq.experiments.sessions.loop.people import Respondent
+from tactileq.experiments.sessions.loop.surfaces import Surfaces
+from tactileq.experiments.sessions.loop.task import Task
 from tactileq.experiments.study.design import Occasion, Order, Trial, dealt, fisher_yates
 from tactileq.experiments.study.models import ModelSets
-from tactileq.rig.interface import Presentable
+from tactileq.rig.shared.interface import Presentable
 
 # --- Parameters -----------------------------------------------------------------------------
 

@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 from math import log10
 from typing import Any
 
-from tactileq.experiments.sessions.people import Respondent
-from tactileq.experiments.sessions.surfaces import Surfaces
-from tactileq.experiments.sessions.task import Task
+from tactileq.experiments.sessions.loop.people import Respondent
+from tactileq.experiments.sessions.loop.surfaces import Surfaces
+from tactileq.experiments.sessions.loop.task import Task
 from tactileq.experiments.study.design import Occasion, Order, Trial, fisher_yates
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.tasks.threshold_posterior import LEVELS_DB, answers_of, next_level_db
-from tactileq.rig.interface import TextureRig, ToneBurst
+from tactileq.rig.shared.interface import TextureRig, ToneBurst
 
 # --- Parameters -----------------------------------------------------------------------------
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from tactileq.experiments.sessions.stored_sessions import StoredSession
+from tactileq.experiments.sessions.kept.stored_sessions import StoredSession
 
 # As many steps from one event to the next, in µs, do not come twice by chance: simulated sessions,
 # whose steps are a few tens of µs, share at most 9 in a row (docs/method/verification.md#copies).

@@ -9,15 +9,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, cast
 
-from tactileq.experiments.sessions.log import Event, plain
-from tactileq.experiments.sessions.people import Choice, Rating, Respondent
-from tactileq.experiments.sessions.resume import resumption
-from tactileq.experiments.sessions.stored_sessions import StoredSession
-from tactileq.experiments.sessions.surfaces import Surfaces
-from tactileq.experiments.sessions.task import Task
+from tactileq.experiments.sessions.kept.log import Event, plain
+from tactileq.experiments.sessions.loop.people import Choice, Rating, Respondent
+from tactileq.experiments.sessions.kept.resume import resumption
+from tactileq.experiments.sessions.kept.stored_sessions import StoredSession
+from tactileq.experiments.sessions.loop.surfaces import Surfaces
+from tactileq.experiments.sessions.loop.task import Task
 from tactileq.experiments.study.design import Trial
 from tactileq.modeling.errors import InputError, shown
-from tactileq.rig.interface import TextureRig
+from tactileq.rig.shared.interface import TextureRig
 
 NEAR = 0.05 + 1e-9  # of a rating: the log rounds where a slider was released to 0.1
 RELATIVE_ERROR = 1e-6  # of what an adaptive task computes, on another machine

@@ -12,7 +12,7 @@ from tactileq.modeling.models.ar_model import ARModel
 from tactileq.modeling.models.loading import AnyModel
 from tactileq.modeling.rendering.lattice import lattice_fields
 from tactileq.modeling.rendering.plan import plan_for
-from tactileq.rig.setup.rig_file import RigFile
+from tactileq.rig.shared.setup.rig_file import RigFile
 
 HIGHEST_LATENCY_MS = 40.0  # textures are felt to change there (Okamoto and others 2009)
 
@@ -78,7 +78,7 @@ def check_models(rig: RigFile, models: Iterable[AnyModel]) -> None:
     InputError
         For one that is not in g, or of a higher rate than the card's; for an AR model that
         `lattice_fields` refuses. Where a device renders it, as
-        `tactileq.rig.device.models.device_model`.
+        `tactileq.rig.machines.device.models.device_model`.
     """
     for model in models:
         if model.unit != "g":
@@ -100,7 +100,7 @@ def check_models(rig: RigFile, models: Iterable[AnyModel]) -> None:
 
 
 def _check_on_device(rig: RigFile, model: AnyModel) -> None:
-    from tactileq.rig.device.models import ANY_DEVICE, device_model  # needs the extra rig
+    from tactileq.rig.machines.device.models import ANY_DEVICE, device_model  # needs the extra rig
 
     device_model(model, ANY_DEVICE, limits=rig.safe_limits)
 

@@ -12,8 +12,8 @@ from math import inf, nan
 import numpy as np
 
 from tactileq.modeling.arrays import Floats
-from tactileq.rig.interface import SURFACES, HandRows, Surface
-from tactileq.rig.live.memory import (
+from tactileq.rig.shared.interface import SURFACES, HandRows, Surface
+from tactileq.rig.shared.live.memory import (
     BEYOND,
     BUTTON,
     FORCE_ASSUMED,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tactileq.rig.live.messages import Message
+from tactileq.rig.shared.live.messages import Message
 
 
 class Listening(Message, frozen=True):

@@ -8,17 +8,17 @@ from pathlib import Path
 
 from tactileq.modeling.vibrators.compensation import Compensation, compensation_for
 from tactileq.modeling.vibrators.exposure import hand_arm_sections
-from tactileq.rig.capture.input import InputSettings
-from tactileq.rig.force.hand import ForceHand
-from tactileq.rig.force.settings import ForceSettings, Pose, Vibration
-from tactileq.rig.hand.reader import HandReader
-from tactileq.rig.hand.settings import HandSettings
-from tactileq.rig.live.clock import check_clock
-from tactileq.rig.live.memory import Live
-from tactileq.rig.setup.rig_file import RigFile
-from tactileq.rig.setup.sections import AccelerometerSection
-from tactileq.rig.sound.output import SoundOutput
-from tactileq.rig.sound.vibration import VibrationOutput
+from tactileq.rig.recording.capture.input import InputSettings
+from tactileq.rig.machines.force.hand import ForceHand
+from tactileq.rig.machines.force.settings import ForceSettings, Pose, Vibration
+from tactileq.rig.devices.hand.reader import HandReader
+from tactileq.rig.devices.hand.settings import HandSettings
+from tactileq.rig.shared.live.clock import check_clock
+from tactileq.rig.shared.live.memory import Live
+from tactileq.rig.shared.setup.rig_file import RigFile
+from tactileq.rig.shared.setup.sections import AccelerometerSection
+from tactileq.rig.devices.sound.output import SoundOutput
+from tactileq.rig.devices.sound.vibration import VibrationOutput
 
 SILENT_S = 0.06  # beyond three blocks: a wall is released where nothing was played for so long
 
@@ -42,8 +42,8 @@ def vibration_output(
     """
     if rig.renderer is None:
         return sound_output(rig, live, seed=seed)
-    from tactileq.rig.device.hand import DeviceHand  # needs the extra rig
-    from tactileq.rig.device.sound import DeviceSound
+    from tactileq.rig.machines.device.hand import DeviceHand  # needs the extra rig
+    from tactileq.rig.machines.device.sound import DeviceSound
 
     opens = hand is None
     if hand is None:
@@ -115,7 +115,7 @@ def hand_reader(rig: RigFile, live: Live, *, seed: int = 0) -> HandReader:
         return HandReader(live, settings)
     if rig.own_device is None:
         return ForceHand(live, settings, force)
-    from tactileq.rig.device.hand import DeviceHand  # needs the extra rig
+    from tactileq.rig.machines.device.hand import DeviceHand  # needs the extra rig
 
     return DeviceHand(live, settings, force)
 

@@ -7,10 +7,10 @@ import numpy as np
 from tactileq.modeling import InputError
 from tactileq.rig.desk.messages import Begin, End, Listening, Take, Taken
 from tactileq.rig.desk.parts import input_settings
-from tactileq.rig.interface import Acceleration
-from tactileq.rig.live.child import Child, ChildLost, Reply
-from tactileq.rig.live.messages import Done, Message
-from tactileq.rig.setup.sections import AccelerometerSection
+from tactileq.rig.shared.interface import Acceleration
+from tactileq.rig.shared.live.child import Child, ChildLost, Reply
+from tactileq.rig.shared.live.messages import Done, Message
+from tactileq.rig.shared.setup.sections import AccelerometerSection
 
 TAKE_S = 30.0
 

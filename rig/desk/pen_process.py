@@ -10,10 +10,10 @@ import threading
 
 import numpy as np
 
-from tactileq.rig.capture.input import AudioInput, InputBlock, InputSettings
+from tactileq.rig.recording.capture.input import AudioInput, InputBlock, InputSettings
 from tactileq.rig.desk.messages import Begin, End, Listening, Request, SampleBlock, Take, Taken
-from tactileq.rig.live.driven import Parent
-from tactileq.rig.live.messages import Done, Message
+from tactileq.rig.shared.live.driven import Parent
+from tactileq.rig.shared.live.messages import Done, Message
 
 LOOK_S = 0.25  # from one look at the input to the next
 RECENT_S = 2.0  # what is not asked for is forgotten after this time

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from tactileq.modeling import InputError
 from tactileq.rig.desk.parts import vibration_output
-from tactileq.rig.interface import PreparedSignal, Stimulus
-from tactileq.rig.live.memory import Live
-from tactileq.rig.setup.rig_file import RigFile
+from tactileq.rig.shared.interface import PreparedSignal, Stimulus
+from tactileq.rig.shared.live.memory import Live
+from tactileq.rig.shared.setup.rig_file import RigFile
 
 
 def check_stimulus(rig: RigFile, stimulus: Stimulus) -> None:

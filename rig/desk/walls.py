@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from itertools import product
 
 from tactileq.modeling import InputError
-from tactileq.rig.force.wall import Wall, largest_stiffness_n_per_mm
-from tactileq.rig.setup.force_sections import ForceSection
-from tactileq.rig.setup.rig_file import RigFile
+from tactileq.rig.machines.force.wall import Wall, largest_stiffness_n_per_mm
+from tactileq.rig.shared.setup.force_sections import ForceSection
+from tactileq.rig.shared.setup.rig_file import RigFile
 
 MARGIN = 0.5  # of the largest stiffness, where nothing says which
 USUAL_MM = 100.0

@@ -1,7 +1,7 @@
 """How long a force device pushes on without its servo, by this machine's clock.
 
 Beside it how late a thread wakes up that does nothing else. `make test` asserts the same by a given
-clock (tests/rig/force/test_processes.py).
+clock (tests/rig/machines/force/test_processes.py).
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from typing import Any
 import pytest
 
 from tactileq.modeling import InputError
-from tactileq.rig.force.hand import ForceHand
-from tactileq.rig.force.standin import StandIn
-from tactileq.rig.force.states import State
-from tactileq.rig.live.clock import now_s
-from tactileq.rig.live.memory import Live
-from tests.rig.force.rig_files import standing_in
-from tests.rig.force.test_processes import WALL, opened, size_n
+from tactileq.rig.machines.force.hand import ForceHand
+from tactileq.rig.machines.force.standin import StandIn
+from tactileq.rig.machines.force.states import State
+from tactileq.rig.shared.live.clock import now_s
+from tactileq.rig.shared.live.memory import Live
+from tests.rig.machines.force.rig_files import standing_in
+from tests.rig.machines.force.test_processes import WALL, opened, size_n
 
 pytestmark = pytest.mark.long("the times of this machine")
 PATIENCE_S = 120.0

@@ -12,7 +12,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.signal import resample, resample_poly
 
 from tactileq.analysis.spectra.findings import find_in
-from tactileq.many_textures import HowToModel, model_textures
+from tactileq.commands.models.many_textures import HowToModel, model_textures
 from tactileq.modeling import (
     ESTIMATORS,
     Recording,

@@ -16,7 +16,7 @@ from tactileq.experiments.observers.whole_study import simulate_study
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.study import Study
 from tactileq.modeling import TextureModel, Threshold, simplify
-from tactileq.rig.twin import SimulatedRig
+from tactileq.rig.desk.twin import SimulatedRig
 from tactileq.stimuli.planted.textures import planted_texture
 
 WAYS = ("in memory", "with every answer on disk")

@@ -19,7 +19,7 @@ from tactileq.experiments.study.study import Study
 from tactileq.experiments.study.task_plan import TaskPlan
 from tactileq.modeling import Threshold, simplify
 from tactileq.modeling.files.claims import ClaimSection, PlanSection
-from tactileq.rig.twin import SimulatedRig
+from tactileq.rig.desk.twin import SimulatedRig
 from tactileq.stimuli.planted.textures import planted_texture
 
 SMALL_STUDY = """

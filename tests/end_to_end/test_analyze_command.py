@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from tactileq.analysis.answers import loading
-from tactileq.commands.analyze import _later_plan, read_answers
+from tactileq.commands.results.analyze import _later_plan, read_answers
 from tactileq.modeling.files.hashes import sha256_of_file, sha256_of_paths
 
 

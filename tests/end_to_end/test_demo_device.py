@@ -9,11 +9,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tactileq.commands.demo_device import PARTICIPANTS, demo_on_devices, device_study
+from tactileq.commands.benches.demo_device import PARTICIPANTS, demo_on_devices, device_study
 from tactileq.experiments.study.study import Study
 from tactileq.modeling import RecordingSet
 from tactileq.modeling.models.loading import models_in
-from tactileq.rig.recorder.store import TABLE_NAME
+from tactileq.rig.machines.recorder.store import TABLE_NAME
 
 TEXTURES = ["PVC", "leather"]
 

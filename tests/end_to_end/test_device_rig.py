@@ -13,9 +13,9 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from tactileq.experiments.sessions.log import read_log
+from tactileq.experiments.sessions.kept.log import read_log
 from tactileq.experiments.verification.verifying import verify_data
-from tactileq.rig.device.emulating import Emulator
+from tactileq.rig.machines.board.emulating import Emulator
 from tactileq.stimuli.planted.textures import planted_texture
 from tests.end_to_end.test_force_rig import press_down
 from tests.end_to_end.test_session_on_a_rig import (
@@ -25,8 +25,8 @@ from tests.end_to_end.test_session_on_a_rig import (
     sit_down,
     study,  # noqa: F401 (a fixture)
 )
-from tests.rig.device.test_in_a_rig import device_rig
-from tests.rig.device.test_renders_in_a_rig import rendering_rig
+from tests.rig.machines.device.test_in_a_rig import device_rig
+from tests.rig.machines.device.test_renders_in_a_rig import rendering_rig
 
 WALL = """
 [wall]

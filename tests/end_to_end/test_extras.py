@@ -55,7 +55,7 @@ def lack(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFacto
         for name in [name for name in sys.modules if name.split(".")[0] == module]:
             monkeypatch.delitem(sys.modules, name)
         monkeypatch.setitem(sys.modules, module, None)
-        monkeypatch.delitem(sys.modules, "tactileq.rig.hand.serial_sensor", raising=False)
+        monkeypatch.delitem(sys.modules, "tactileq.rig.devices.hand.serial_sensor", raising=False)
 
     return hide
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from tactileq.rig.live.compiled import CLOCK
-from tactileq.rig.setup.rig_file import SHIPPED_RIG_FILE
+from tactileq.rig.shared.live.compiled import CLOCK
+from tactileq.rig.shared.setup.rig_file import SHIPPED_RIG_FILE
 from tactileq.stimuli.planted.textures import planted_texture
 
 Jack = Callable[..., AbstractContextManager[Any]]

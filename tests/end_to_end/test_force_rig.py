@@ -15,15 +15,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tactileq.experiments.sessions.exposure import exposed_g2_s
-from tactileq.experiments.sessions.log import read_log
-from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.store.exposure import exposed_g2_s
+from tactileq.experiments.sessions.kept.log import read_log
+from tactileq.experiments.sessions.kept.manifest import SessionManifest
 from tactileq.experiments.verification.verifying import verify_data
 from tactileq.modeling.vibrators.exposure import daily_exposure_m_s2
-from tactileq.rig.force.standin import StandIn, library_path
-from tactileq.rig.force.states import State
-from tactileq.rig.live.clock import sleep
-from tactileq.rig.setup.rig_file import RigFile
+from tactileq.rig.machines.force.standin import StandIn, library_path
+from tactileq.rig.machines.force.states import State
+from tactileq.rig.shared.live.clock import sleep
+from tactileq.rig.shared.setup.rig_file import RigFile
 from tests.end_to_end.test_session_on_a_rig import (
     STUDY,
     WORDS,
@@ -31,7 +31,7 @@ from tests.end_to_end.test_session_on_a_rig import (
     sit_down,
     study,  # noqa: F401 (a fixture)
 )
-from tests.rig.force.rig_files import force_rig, standing_in
+from tests.rig.machines.force.rig_files import force_rig, standing_in
 from tests.rig.waiting import follow, wait_until
 
 WALL = """
@@ -73,8 +73,8 @@ def test_the_check_says_what_no_hardware_has_confirmed(
 def test_the_stiffness_of_the_real_surface_is_found_and_the_wall_made_as_stiff(
     main: Any, tmp_path: Path, force_device: StandIn, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tactileq.rig.calibration.stiffness.PRESS_S", 1.5)
-    monkeypatch.setattr("tactileq.rig.force.standin.CARRIED_S", 0.7)
+    monkeypatch.setattr("tactileq.rig.desk.calibration.stiffness.PRESS_S", 1.5)
+    monkeypatch.setattr("tactileq.rig.machines.force.standin.CARRIED_S", 0.7)
     force_device.fields.real_stiffness = 700.0
     file = force_rig(tmp_path).path
     done = main("rig", "stiffness", "--picture", "stiffness.png")
@@ -92,8 +92,8 @@ def test_the_stiffness_of_the_real_surface_is_found_and_the_wall_made_as_stiff(
 def test_a_surface_that_does_not_give_way_is_no_spring(
     main: Any, tmp_path: Path, force_device: StandIn, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tactileq.rig.calibration.stiffness.PRESS_S", 1.5)
-    monkeypatch.setattr("tactileq.rig.force.standin.CARRIED_S", 0.7)
+    monkeypatch.setattr("tactileq.rig.desk.calibration.stiffness.PRESS_S", 1.5)
+    monkeypatch.setattr("tactileq.rig.machines.force.standin.CARRIED_S", 0.7)
     force_device.fields.real_stiffness = 1e5
     before = force_rig(tmp_path).path.read_text()
     done = main("rig", "stiffness")

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tactileq.commands.imports import add_to_set
+from tactileq.commands.recording.imports import add_to_set
 from tactileq.modeling import Recording, RecordingSet
-from tactileq.rig.importing.files import Imported
+from tactileq.rig.recording.importing.files import Imported
 
 
 def test_six_imports_at_once_all_arrive(tmp_path: Path) -> None:

@@ -15,12 +15,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tactileq.commands.analyze import read_answers
-from tactileq.commands.study_status import study_status
-from tactileq.experiments.sessions.roster import Roster
-from tactileq.experiments.sessions.withdrawing import files_of, withdraw
+from tactileq.commands.results.analyze import read_answers
+from tactileq.commands.study.status import study_status
+from tactileq.experiments.sessions.kept.roster import Roster
+from tactileq.experiments.sessions.store.withdrawing import files_of, withdraw
 from tactileq.modeling import InputError
-from tests.experiments.sessions.enrolling import enrolled
+from tests.experiments.sessions.store.enrolling import enrolled
 from tests.experiments.verification.small_studies import run_one, small_models, small_study
 from tests.mutating import mutated
 

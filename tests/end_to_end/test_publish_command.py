@@ -14,7 +14,7 @@ import pytest
 import tomlkit
 from rocrate.rocrate import ROCrate
 
-from tactileq.experiments.sessions.stored_sessions import held_sessions
+from tactileq.experiments.sessions.kept.stored_sessions import held_sessions
 from tactileq.experiments.study.study import Study
 from tactileq.modeling.files.hashes import seal_over
 from tests.experiments.verification.small_studies import (

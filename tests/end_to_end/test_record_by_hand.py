@@ -12,16 +12,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactileq.commands.record_audio import InputOptions, input_from, print_assumed
+from tactileq.commands.recording.audio import InputOptions, input_from, print_assumed
 from tactileq.modeling import RecordingSet
-from tactileq.rig.capture.grid import StrokeGrid
-from tactileq.rig.capture.input import InputSettings
-from tactileq.rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
+from tactileq.rig.recording.capture.grid import StrokeGrid
+from tactileq.rig.recording.capture.input import InputSettings
+from tactileq.rig.shared.setup.rig_file import SHIPPED_RIG_FILE, RigFile
 from tests.conftest import ENDED_WITH_US
 from tests.rig.waiting import wait_until
 
 ROOT = Path(__file__).parents[2]
-PLAYING = ROOT / "tests/rig/capture/playing.py"
+PLAYING = ROOT / "tests/rig/recording/capture/playing.py"
 # A scripted hand strokes as a sine of 150 mm/s at 1.5 N, so of these it reaches one.
 GRID = "speeds_mm_s = [150, 300]\nforces_n = [1.5]\nspeed_tolerance = 0.3\n"
 BY_HAND = ["--audio", "--texture", "oak", "--hand", "scripted", "--grid", "grid.toml"]

@@ -17,10 +17,10 @@ import pytest
 from tactileq.analysis.textures.between import halfway, truth_summary
 from tactileq.modeling import RecordingSet, fit_texture
 from tactileq.modeling.files.tables import read_cells
-from tactileq.rig.device.emulating import Emulator
-from tactileq.rig.live.clock import now_s, sleep
-from tactileq.rig.recorder.recorder_file import SHIPPED_RECORDER_FILE, RecorderFile
-from tactileq.rig.recorder.store import RECORDER_COLUMNS, TABLE_NAME
+from tactileq.rig.machines.board.emulating import Emulator
+from tactileq.rig.shared.live.clock import now_s, sleep
+from tactileq.rig.machines.recorder.recorder_file import SHIPPED_RECORDER_FILE, RecorderFile
+from tactileq.rig.machines.recorder.store import RECORDER_COLUMNS, TABLE_NAME
 from tactileq.stimuli.planted.textures import (
     FORCES_N,
     RECORDER_RATE_HZ,
@@ -93,7 +93,7 @@ def test_what_cannot_be_recorded_is_refused(
 
 
 def test_the_shipped_file_is_the_default_law() -> None:
-    from tactileq.rig.recorder.law import RecorderLaw
+    from tactileq.rig.machines.recorder.law import RecorderLaw
 
     assert RecorderFile.load(SHIPPED_RECORDER_FILE).law() == RecorderLaw()
 

@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
-from tactileq.commands.rig_monitor import _play_on
+from tactileq.commands.rig.monitor import _play_on
 from tactileq.modeling import InputError
-from tactileq.rig.live.memory import Live
+from tactileq.rig.shared.live.memory import Live
 from tactileq.stimuli.planted.textures import planted_texture
 from tests.rig.desk.rig_files import rig_file
 from tests.rig.waiting import wait_until
@@ -56,7 +56,7 @@ def sound_process(monitor: Monitor) -> tuple[int, Path] | None:
             words = Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0")
             maps = Path(f"/proc/{child}/maps").read_text().split()
             shared = [word for word in maps if "/tactileq-live-" in word]
-            if b"tactileq.rig.sound.process" in words and shared:
+            if b"tactileq.rig.devices.sound.process" in words and shared:
                 return int(child), Path(shared[0])
     return None
 

@@ -16,7 +16,7 @@ from tactileq.experiments.observers.experimenter import SimulatedExperimenter
 from tactileq.experiments.observers.percepts import Perception
 from tactileq.experiments.observers.psychometrics import Psychometrics
 from tactileq.experiments.observers.simulated import SimulatedParticipant
-from tactileq.experiments.sessions.manifest import SessionManifest
+from tactileq.experiments.sessions.kept.manifest import SessionManifest
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.study import Study
 from tactileq.modeling import Scene, TextureModel, Threshold, compile_scene
@@ -283,9 +283,9 @@ def test_a_session_presents_the_models_of_a_scene(
     )
     someone = SimulatedParticipant(perception, Psychometrics(), seed=1, subject=1, occasion=(1,))
     monkeypatch.setattr(
-        "tactileq.commands.session.open_console", lambda *_, **of: nullcontext(someone)
+        "tactileq.commands.study.session.open_console", lambda *_, **of: nullcontext(someone)
     )
-    monkeypatch.setattr("tactileq.experimenter.Terminal", SimulatedExperimenter)
+    monkeypatch.setattr("tactileq.commands.study.experimenter.Terminal", SimulatedExperimenter)
     words = ("--task", "relative", "--subject", 1, "--study", "study.toml")
     done = main("session", *words, "--scene", "both.toml", "--data", "data")
     assert done.returncode == 0, done.stderr

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from tactileq.experiments.sessions.log import read_log
+from tactileq.experiments.sessions.kept.log import read_log
 from tests.rig.waiting import wait_until
 from tests.two_surfaces import save_two_surfaces
 

@@ -16,13 +16,13 @@ import pandas as pd
 import pytest
 
 from tactileq.analysis.answers.loading import load_responses
-from tactileq.experiments.sessions.log import read_log
-from tactileq.experiments.sessions.manifest import SessionManifest
-from tactileq.experiments.sessions.people import Choice, Rating
-from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.sessions.kept.log import read_log
+from tactileq.experiments.sessions.kept.manifest import SessionManifest
+from tactileq.experiments.sessions.loop.people import Choice, Rating
+from tactileq.experiments.sessions.loop.surfaces import Surfaces
 from tactileq.experiments.verification.verifying import verify_data
 from tactileq.rig.desk.lock import rig_locked
-from tactileq.rig.setup.rig_file import RigFile
+from tactileq.rig.shared.setup.rig_file import RigFile
 from tactileq.stimuli.planted.textures import planted_texture
 from tests.experiments.scripted import Ready, Scripted
 from tests.rig.desk.rig_files import rig_text
@@ -141,9 +141,9 @@ def sit_down(monkeypatch: pytest.MonkeyPatch, someone: Scripted) -> Ready:
     """Somebody sits at the screen, and at the terminal an experimenter who is always ready."""
     experimenter = Ready()
     monkeypatch.setattr(
-        "tactileq.commands.session.open_console", lambda *_, **of: nullcontext(someone)
+        "tactileq.commands.study.session.open_console", lambda *_, **of: nullcontext(someone)
     )
-    monkeypatch.setattr("tactileq.experimenter.Terminal", lambda: experimenter)
+    monkeypatch.setattr("tactileq.commands.study.experimenter.Terminal", lambda: experimenter)
     return experimenter
 
 

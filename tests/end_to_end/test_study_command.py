@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactileq.experiments.sessions.traces import PRESENTATION_COLUMNS
+from tactileq.experiments.sessions.kept.traces import PRESENTATION_COLUMNS
 from tactileq.experiments.study.study import SHIPPED_STUDY, Study
 from tactileq.modeling import Threshold, simplify
 from tactileq.modeling.files.columns import Column

@@ -9,15 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from tactileq.experiments.sessions.people import Choice, Rating
-from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.sessions.loop.people import Choice, Rating
+from tactileq.experiments.sessions.loop.surfaces import Surfaces
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.study import Study
 from tactileq.experiments.study.task_plan import TaskPlan
 from tactileq.experiments.tasks.absolute import AbsoluteTrial
 from tactileq.experiments.tasks.relative import RelativeTrial
 from tactileq.modeling import TextureModel, Threshold, simplify
-from tactileq.rig.interface import (
+from tactileq.rig.shared.interface import (
     Acceleration,
     Fault,
     HandRows,

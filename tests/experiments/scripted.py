@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from tactileq.experiments.sessions.people import Choice, Intake, ProgressReport, Rating
-from tactileq.experiments.sessions.surfaces import Note, Surfaces
+from tactileq.experiments.sessions.loop.people import Choice, Intake, ProgressReport, Rating
+from tactileq.experiments.sessions.loop.surfaces import Note, Surfaces
 
 
 class Scripted:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from tactileq.experiments.sessions.log import sealed_line
+from tactileq.experiments.sessions.kept.log import sealed_line
 
 
 def sealed(events: Iterable[dict[str, Any]]) -> tuple[bytes, str]:

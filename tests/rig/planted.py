@@ -6,7 +6,7 @@ import numpy as np
 
 from tactileq.modeling import TextureModel
 from tactileq.modeling.arrays import Floats
-from tactileq.rig.interface import Stimulus
+from tactileq.rig.shared.interface import Stimulus
 
 
 def planted_model(gain: float = 0.2, *, rate_hz: float = 5000.0) -> TextureModel:

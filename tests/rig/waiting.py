@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from tactileq.rig.live.clock import now_s, sleep, taking_part
-from tactileq.rig.live.memory import GONE, Live
+from tactileq.rig.shared.live.clock import now_s, sleep, taking_part
+from tactileq.rig.shared.live.memory import GONE, Live
 
 
 def wait_until(holds: Callable[[], bool], *, seconds: float = 20, every_s: float = 0.01) -> None:

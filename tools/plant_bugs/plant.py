@@ -91,7 +91,7 @@ class Copy:
         """Refuse a copy whose tests would run the installed project."""
         modules = (
             "tactileq.modeling.rendering._kernel",
-            "tactileq.rig.live._live",
+            "tactileq.rig.shared.live._live",
             "tactileq.app",
             "tests.conftest",
         )

@@ -14,21 +14,21 @@ import pytest
 from tactileq.analysis.answers.hand import HAND_MEASURES, load_hand
 from tactileq.analysis.answers.loading import load_responses
 from tactileq.experiments.observers.whole_study import simulate_study
-from tactileq.experiments.sessions.bids_events import EVENT_COLUMNS
-from tactileq.experiments.sessions.bids_physio import (
+from tactileq.experiments.sessions.bids.events import EVENT_COLUMNS
+from tactileq.experiments.sessions.bids.physio import (
     PHYSIO_COLUMNS,
     RATE_HZ,
     at_regular_times,
     physio_bytes,
 )
-from tactileq.experiments.sessions.bids_tables import json_bytes, table_bytes
+from tactileq.experiments.sessions.bids.tables import json_bytes, table_bytes
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.study import Study
 from tactileq.experiments.study.task_plan import TaskPlan
 from tactileq.modeling import InputError, Threshold, simplify
 from tactileq.modeling.files.answer_tables import ANSWER_TABLES, CORRECT, answer_table
 from tactileq.modeling.files.columns import names, sidecar
-from tactileq.rig.twin import SimulatedRig
+from tactileq.rig.desk.twin import SimulatedRig
 from tactileq.stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 

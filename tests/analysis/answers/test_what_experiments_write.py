@@ -17,7 +17,7 @@ from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.study import Study
 from tactileq.experiments.study.task_plan import TaskPlan
 from tactileq.modeling import Threshold, simplify
-from tactileq.rig.twin import SimulatedRig
+from tactileq.rig.desk.twin import SimulatedRig
 from tactileq.stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 

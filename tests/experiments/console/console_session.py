@@ -21,13 +21,13 @@ import time
 from psychopy import visual
 
 from tactileq.experiments.console.console import Console
-from tactileq.experiments.sessions.people import Intake, SessionAborted
-from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.sessions.loop.people import Intake, SessionAborted
+from tactileq.experiments.sessions.loop.surfaces import Surfaces
 from tactileq.experiments.study.questions import Question
 from tactileq.experiments.tasks.absolute import AbsoluteTrial
 from tactileq.experiments.tasks.oddity import OddityTrial
 from tactileq.experiments.tasks.relative import RelativeTrial
-from tactileq.rig.twin import SimulatedRig
+from tactileq.rig.desk.twin import SimulatedRig
 from tactileq.stimuli.planted.textures import planted_texture
 
 QUESTIONS = (

@@ -21,16 +21,16 @@ from tactileq.experiments.console import page_runner
 from tactileq.experiments.console.console import Console
 from tactileq.experiments.console.drawing import HALF_RISE
 from tactileq.experiments.console.languages import Texts
-from tactileq.experiments.sessions.people import Intake, SessionAborted
-from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.sessions.loop.people import Intake, SessionAborted
+from tactileq.experiments.sessions.loop.surfaces import Surfaces
 from tactileq.experiments.study.questions import MOST_LEVELS, Question
 from tactileq.experiments.study.study import Study
 from tactileq.experiments.tasks.absolute import AbsoluteTrial
 from tactileq.experiments.tasks.oddity import OddityTrial
 from tactileq.experiments.tasks.relative import RelativeTrial
 from tactileq.experiments.tasks.threshold import ThresholdTrial
-from tactileq.rig.interface import ToneBurst
-from tactileq.rig.twin import SimulatedRig
+from tactileq.rig.shared.interface import ToneBurst
+from tactileq.rig.desk.twin import SimulatedRig
 from tactileq.stimuli.planted.textures import planted_texture
 
 drawn = []

@@ -11,7 +11,7 @@ import pytest
 from tactileq.experiments.console.selftest import PRESSES, Timing, time_presentations, time_syncs
 from tactileq.experiments.study.models import ModelSets
 from tactileq.modeling import InputError
-from tactileq.rig.interface import Fault
+from tactileq.rig.shared.interface import Fault
 from tests.refusals import refused
 
 

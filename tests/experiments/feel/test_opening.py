@@ -16,16 +16,16 @@ from tactileq.experiments.feel import opening
 from tactileq.experiments.feel.live_rig import LiveRig
 from tactileq.experiments.feel.opening import NO_SOUND, demonstration, desk
 from tactileq.modeling import InputError, TextureModel, compensation_for
-from tactileq.rig.force.standin import StandIn
-from tactileq.rig.live.clock import now_s, sleep
-from tactileq.rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, HEARTBEAT_S, Live
-from tactileq.rig.setup.rig_file import SHIPPED_RIG_FILE
-from tactileq.rig.sound.devices import SoundDevice
-from tactileq.rig.sound.supervision import SoundLost
+from tactileq.rig.machines.force.standin import StandIn
+from tactileq.rig.shared.live.clock import now_s, sleep
+from tactileq.rig.shared.live.memory import CONTACT, FORCE_ASSUMED, GONE, HEARTBEAT_S, Live
+from tactileq.rig.shared.setup.rig_file import SHIPPED_RIG_FILE
+from tactileq.rig.devices.sound.devices import SoundDevice
+from tactileq.rig.devices.sound.supervision import SoundLost
 from tactileq.stimuli.planted.textures import planted_texture
 from tactileq.stimuli.planted.vibrators import planted_vibrator
 from tests.refusals import refused
-from tests.rig.force.rig_files import force_rig
+from tests.rig.machines.force.rig_files import force_rig
 
 Jack = Callable[..., AbstractContextManager[Any]]
 PATIENCE_S = 500.0  # for a hang, not for speed

@@ -18,8 +18,8 @@ from tactileq.experiments.observers.psychometrics import (
     choice_shares,
 )
 from tactileq.experiments.observers.simulated import SimulatedParticipant, require_plantable
-from tactileq.experiments.sessions.people import Intake
-from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.sessions.loop.people import Intake
+from tactileq.experiments.sessions.loop.surfaces import Surfaces
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.questions import Question
 from tactileq.experiments.study.study import Study
@@ -30,8 +30,8 @@ from tactileq.experiments.tasks.threshold import ThresholdTrial
 from tactileq.modeling import InputError, TextureModel, Threshold
 from tactileq.modeling.participants.choices import oddity_share
 from tactileq.modeling.participants.ratings import AT_END
-from tactileq.rig.interface import ToneBurst
-from tactileq.rig.twin import SimulatedRig
+from tactileq.rig.shared.interface import ToneBurst
+from tactileq.rig.desk.twin import SimulatedRig
 from tests.refusals import refused
 
 EXACT = Psychometrics(

@@ -13,7 +13,7 @@ from tactileq.experiments.observers.percepts import Perception
 from tactileq.experiments.observers.psychometrics import Psychometrics
 from tactileq.experiments.study.models import ModelSets
 from tactileq.modeling import InputError, TextureModel, Threshold
-from tactileq.rig.twin import SimulatedRig
+from tactileq.rig.desk.twin import SimulatedRig
 from tests.refusals import refused
 
 

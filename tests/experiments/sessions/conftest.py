@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tactileq.experiments.sessions.files import SessionFiles
-from tactileq.experiments.sessions.manifest import SessionManifest
-from tactileq.experiments.sessions.program import program_facts
-from tactileq.experiments.sessions.roster import Roster
-from tactileq.experiments.sessions.session_store import SessionStore
+from tactileq.experiments.sessions.kept.files import SessionFiles
+from tactileq.experiments.sessions.kept.manifest import SessionManifest
+from tactileq.experiments.sessions.kept.program import program_facts
+from tactileq.experiments.sessions.kept.roster import Roster
+from tactileq.experiments.sessions.store.session_store import SessionStore
 from tactileq.modeling.files.hashes import sha256_of_values
-from tactileq.rig.interface import HandRows, PresentationRecord
-from tests.experiments.sessions.enrolling import enrolled
+from tactileq.rig.shared.interface import HandRows, PresentationRecord
+from tests.experiments.sessions.store.enrolling import enrolled
 
 SURFACES = ("canvas", 'say "velvet", or', "和紙")
 SETS = ("full", "simplified")

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tactileq.experiments.sessions.people import Choice
-from tactileq.experiments.sessions.surfaces import Surfaces
+from tactileq.experiments.sessions.loop.people import Choice
+from tactileq.experiments.sessions.loop.surfaces import Surfaces
 from tactileq.experiments.tasks.threshold import FREQUENCIES_HZ, ThresholdTrial
 from tactileq.experiments.tasks.threshold_posterior import Answer, next_level_db
 from tactileq.modeling.files.answer_tables import ANSWER_TABLES

@@ -17,22 +17,22 @@ import numpy as np
 import pytest
 
 from tactileq.experiments.observers.experimenter import SimulatedExperimenter
-from tactileq.experiments.sessions import log
-from tactileq.experiments.sessions.bids import export_all, export_session
-from tactileq.experiments.sessions.files import SessionFiles
-from tactileq.experiments.sessions.people import Choice, Intake, Rating, SessionAborted
-from tactileq.experiments.sessions.running import Circumstances, run_session
-from tactileq.experiments.sessions.stored_sessions import held_session
-from tactileq.experiments.sessions.surfaces import Surfaces
-from tactileq.experiments.sessions.trial_loop import People, SessionResult
-from tactileq.experiments.sessions.withdrawing import drop_out, withdraw
+from tactileq.experiments.sessions.kept import log
+from tactileq.experiments.sessions.bids.export import export_all, export_session
+from tactileq.experiments.sessions.kept.files import SessionFiles
+from tactileq.experiments.sessions.loop.people import Choice, Intake, Rating, SessionAborted
+from tactileq.experiments.sessions.loop.running import Circumstances, run_session
+from tactileq.experiments.sessions.kept.stored_sessions import held_session
+from tactileq.experiments.sessions.loop.surfaces import Surfaces
+from tactileq.experiments.sessions.loop.trial_loop import People, SessionResult
+from tactileq.experiments.sessions.store.withdrawing import drop_out, withdraw
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.questions import Question
 from tactileq.experiments.study.study import Study
 from tactileq.experiments.study.task_plan import TaskPlan
 from tactileq.experiments.tasks import task_named
 from tactileq.modeling import Simplification, Threshold, simplify
-from tactileq.rig.twin import SimulatedRig
+from tactileq.rig.desk.twin import SimulatedRig
 from tactileq.stimuli.planted.textures import planted_texture
 from tests.experiments.scripted import Scripted
 

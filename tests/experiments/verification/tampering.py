@@ -15,8 +15,8 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from tactileq.experiments.sessions.bids import export_all
-from tactileq.experiments.sessions.log import line_of
+from tactileq.experiments.sessions.bids.export import export_all
+from tactileq.experiments.sessions.kept.log import line_of
 from tests.experiments.sealing import sealed
 
 FIRST = "sub-01_ses-01_task-absolute"

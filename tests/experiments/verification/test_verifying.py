@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from tactileq.experiments.sessions.log import line_of, read_log
-from tactileq.experiments.sessions.manifest import SessionManifest
-from tactileq.experiments.sessions.session_store import SessionStore
+from tactileq.experiments.sessions.kept.log import line_of, read_log
+from tactileq.experiments.sessions.kept.manifest import SessionManifest
+from tactileq.experiments.sessions.store.session_store import SessionStore
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.verification.verifying import verify_data
 from tactileq.modeling import InputError
@@ -191,7 +191,7 @@ def test_logs_of_earlier_versions_are_unsealed_and_otherwise_verified(copied: Pa
     roster = copied / "sourcedata/roster.jsonl"
     enrolled = [event for event in lines(roster) if event["event"] == "enrolled"]
     write(roster, [{n: v for n, v in event.items() if n != "seal"} for event in enrolled])
-    from tactileq.experiments.sessions.bids import export_all
+    from tactileq.experiments.sessions.bids.export import export_all
 
     export_all(copied)
     found = verify_data(copied)
@@ -229,7 +229,7 @@ def test_published_data_are_compared_with_the_hashes_in_their_sidecars(copied: P
 
 
 def test_after_everybody_withdrew_nothing_differs(copied: Path) -> None:
-    from tactileq.experiments.sessions.withdrawing import withdraw
+    from tactileq.experiments.sessions.store.withdrawing import withdraw
 
     for subject in (1, 2):
         withdraw(copied, subject)

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tactileq.analysis.columns import tsv_text
-from tactileq.experiments.sessions.bids_tables import cell as bids_cell
-from tactileq.experiments.sessions.tables import cell as session_cell
+from tactileq.experiments.sessions.bids.tables import cell as bids_cell
+from tactileq.experiments.sessions.kept.tables import cell as session_cell
 from tactileq.modeling.files.columns import Column
 from tactileq.modeling.files.tables import guarded, read_table, table_text, unguarded, write_table
 

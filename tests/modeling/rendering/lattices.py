@@ -15,7 +15,7 @@ from tactileq.modeling.rendering.compiled import filled, render_counters
 from tactileq.modeling.rendering.lattice import lattice_fields
 from tactileq.modeling.rendering.noise import stream_key
 from tactileq.modeling.rendering.plan import RenderCounters, plan_for
-from tactileq.rig.live.compiled import compiled
+from tactileq.rig.shared.live.compiled import compiled
 
 
 def ar_model(

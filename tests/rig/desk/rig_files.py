@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from datetime import date
 from pathlib import Path
 
-from tactileq.rig.interface import Fault
-from tactileq.rig.setup.rig_file import RigFile
+from tactileq.rig.shared.interface import Fault
+from tactileq.rig.shared.setup.rig_file import RigFile
 
 TEXT = """
 version = 1

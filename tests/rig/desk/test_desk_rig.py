@@ -20,15 +20,15 @@ from tactileq.modeling import InputError, TextureModel
 from tactileq.rig.desk.checks import Requirements
 from tactileq.rig.desk.desk_rig import DeskRig
 from tactileq.rig.desk.stimuli import check_stimulus
-from tactileq.rig.interface import SURFACES, TextureRig, ToneBurst
-from tactileq.rig.live.clock import sleep, taking_part
-from tactileq.rig.live.memory import HEARTBEAT_S
+from tactileq.rig.shared.interface import SURFACES, TextureRig, ToneBurst
+from tactileq.rig.shared.live.clock import sleep, taking_part
+from tactileq.rig.shared.live.memory import HEARTBEAT_S
 from tactileq.stimuli.planted.textures import planted_texture
 from tests.modeling.rendering.lattices import planted_ar
 from tests.refusals import refused
 from tests.rig.desk.rig_files import failures, rig_file
-from tests.rig.hand.board import Board, stating
-from tests.rig.hand.board import at_constant_speed as plain
+from tests.rig.devices.hand.board import Board, stating
+from tests.rig.devices.hand.board import at_constant_speed as plain
 from tests.rig.planted import planted_stimulus
 from tests.rig.waiting import follow, wait_until
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from tactileq.rig.desk.journal import Journal, Played
-from tactileq.rig.interface import SURFACES
-from tactileq.rig.live.memory import (
+from tactileq.rig.shared.interface import SURFACES
+from tactileq.rig.shared.live.memory import (
     BLOCK,
     BUTTON,
     CONTACT,

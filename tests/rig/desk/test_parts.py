@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from tactileq.rig.desk.parts import sound_output
-from tactileq.rig.live.memory import Live
-from tactileq.rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
+from tactileq.rig.shared.live.memory import Live
+from tactileq.rig.shared.setup.rig_file import SHIPPED_RIG_FILE, RigFile
 
 
 def test_the_shipped_rig_can_play_all_that_its_limits_allow() -> None:

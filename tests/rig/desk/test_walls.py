@@ -10,10 +10,10 @@ import pytest
 from tactileq.experiments.study.wall import WallSection, WallUnder
 from tactileq.modeling import InputError
 from tactileq.rig.desk.walls import Walls, check_walls, in_device, usual_wall
-from tactileq.rig.force.wall import Wall
-from tactileq.rig.setup.rig_file import RigFile
+from tactileq.rig.machines.force.wall import Wall
+from tactileq.rig.shared.setup.rig_file import RigFile
 from tests.rig.desk.rig_files import rig_file
-from tests.rig.force.rig_files import force_rig
+from tests.rig.machines.force.rig_files import force_rig
 
 REAL = """hand_measured = false
 offset_mm = { value = 30.0, unit = "mm", assumed = false, source = "a ruler" }

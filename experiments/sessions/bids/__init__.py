@@ -1,0 +1,1 @@
+"""What BIDS shows of the data that sessions wrote."""

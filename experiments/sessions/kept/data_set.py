@@ -1,0 +1,122 @@
+"""Which study, models and participants a data folder accepts: those of its first session."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from tactileq.experiments.sessions.kept.files import write_new
+from tactileq.experiments.sessions.kept.log import plain
+from tactileq.experiments.sessions.kept.manifest import SessionManifest
+from tactileq.experiments.sessions.kept.overrides import Overrides
+from tactileq.experiments.study.study import Study
+from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.documents import dump_json, read_json_object
+from tactileq.modeling.files.places import locked
+
+BIDS_VERSION = "1.10.0"
+DESCRIPTION_NAME = "dataset_description.json"
+# What may differ for a stated reason; people and simulations never share a folder.
+MAY_DIFFER = {"StudySHA256": "study", "ModelsSHA256": "models", "Pilot": "pilot"}
+
+
+def claim_data_set(root: Path, manifest: SessionManifest, *, overrides: Overrides) -> None:
+    """Describe a new data set as the session's, or check that the one there takes the session.
+
+    Parameters
+    ----------
+    root : Path
+        Made if it is not there.
+    overrides : Overrides
+        Another study or other models, and pilot data beside others, are against the rules.
+
+    Raises
+    ------
+    InputError
+        If it holds data of another study, of other models or of another kind of participants.
+    OSError
+        If the disk does not take the description.
+    """
+    path = root / DESCRIPTION_NAME
+    with locked(path):
+        try:
+            write_new(path, dump_json(describe_data_set(manifest)).encode())
+        except FileExistsError:
+            found = read_json_object(path, advice="choose another data folder for these sessions")
+            _check(found, describe_data_set(manifest), path=path, overrides=overrides)
+
+
+def require_study(root: Path, study: Study) -> None:
+    """Refuse a data folder of another study, by its name: its file may have been edited since.
+
+    Raises
+    ------
+    InputError
+        Also where it does not describe its data.
+    """
+    path = root / DESCRIPTION_NAME
+    found = read_json_object(path, advice="name the folder of the study's data").get("Name")
+    if found != study.name:
+        raise InputError(
+            f"expected the data of the study {shown(study.name)} in {root}, got those of "
+            f"{shown(found)}; name their folder with --data, or the other study."
+        )
+
+
+def describe_data_set(manifest: SessionManifest) -> dict[str, Any]:
+    """The description of a data set that begins with this session."""
+    study = manifest.study
+    described: dict[str, Any] = plain(
+        {
+            "Name": study.get("name", "not stated"),
+            "BIDSVersion": BIDS_VERSION,
+            "DatasetType": "raw",
+            "License": study.get("data_license", "not stated"),
+            "Simulated": manifest.simulated,
+            "SimulatedParticipant": manifest.simulated_participant,
+            "SimulatedRig": manifest.simulated_rig,
+            "Pilot": manifest.pilot,
+            "StudySHA256": manifest.study_sha256,
+            "ModelsSHA256": manifest.models_sha256,
+            "StudyDesign": study,
+            "GeneratedBy": [{"Name": "tactileq", "Version": manifest.versions.get("tactileq", "")}],
+        }
+    )
+    return described
+
+
+def _check(
+    found: Mapping[str, Any], wanted: Mapping[str, Any], *, path: Path, overrides: Overrides
+) -> None:
+    for key in ("SimulatedParticipant", "SimulatedRig"):
+        if found.get(key) is not wanted[key]:
+            raise InputError(
+                f"expected a data folder with {key} {wanted[key]} in {path}, got "
+                f"{shown(found.get(key))}; choose another data folder for these sessions, since "
+                "people and simulations never share one."
+            )
+    for key, what in MAY_DIFFER.items():
+        if found.get(key) != wanted[key]:
+            overrides.allow(
+                what,
+                f"expected a data folder of this {_differs(key, found, wanted)} in {path}; choose "
+                "another data folder for these sessions",
+            )
+
+
+def _differs(key: str, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
+    if key == "StudySHA256":
+        return f"study, got another {differing(found.get('StudyDesign'), wanted['StudyDesign'])}"
+    if key == "ModelsSHA256":
+        return f"set of models, got another {differing(found.get(key), wanted[key])}"
+    return f"kind (pilot {wanted[key]}), got {shown(found.get(key))}"
+
+
+def differing(there: object, here: Mapping[str, Any]) -> str:
+    """The names whose values differ; what is there, where that has no names."""
+    if not isinstance(there, dict):
+        return shown(there)
+    names = sorted(k for k in there.keys() | here if there.get(k) != here.get(k))
+    return ", ".join(names) or "hash"

@@ -1,0 +1,1 @@
+"""One session as it runs: order, people, surfaces, the loop of its trials."""

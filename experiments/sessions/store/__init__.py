@@ -1,0 +1,1 @@
+"""Where a session's answers go: admission, store, exposure, status, withdrawal."""

@@ -1,0 +1,107 @@
+"""What registers of tactileq-cables hold.
+
+Made from device.yml by `make docs-tables`; do not edit.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum, IntFlag
+
+
+class DeviceState(IntEnum):
+    """States of rig/machines/force/force.h."""
+
+    BOOT = 0
+    IDLE = 1
+    ARMED = 2
+    RUNNING = 3
+    RELEASING = 4
+    FAULT = 5
+
+
+class DeviceCommand(IntEnum):
+    """What the host asks for."""
+
+    NONE = 0
+    ARM = 1
+    SHOW = 2
+    HIDE = 3
+    CLEAR = 4
+    STOP = 5
+    HOME = 6
+
+
+class DeviceCause(IntEnum):
+    """Why the device let go."""
+
+    NONE = 0
+    NOT_READ = 1
+    NOT_A_NUMBER = 2
+    LATE = 3
+    JUMP = 4
+    SPEED = 5
+    WORKSPACE = 6
+    FROZEN = 7
+    HEARTBEAT = 8
+    SOUND = 9
+    WATCHDOG = 10
+    NOT_WRITTEN = 11
+    STOPPED = 12
+    STOOD_STILL = 13
+    LINK = 14
+    HOST = 15
+    STUCK = 16
+    SLACK = 17
+
+
+class DeviceSource(IntEnum):
+    """What the vibrator plays."""
+
+    NOTHING = 0
+    MODEL = 1
+    HOST = 2
+
+
+class DeviceSimulation(IntEnum):
+    """What goes wrong from now on, of a simulated board only."""
+
+    NONE = 0
+    STUCK = 1
+    JUMP = 2
+    FLIPPED = 3
+    WRAPPED = 4
+    BROWN_OUT = 5
+    MOTOR = 6
+    UNPLUGGED = 7
+    SLACK = 8
+    BUTTON = 9
+
+
+class DeviceStatus(IntEnum):
+    """First byte of every reply."""
+
+    OK = 0
+    ADDRESS = 1
+    ACCESS = 2
+    LENGTH = 3
+    RANGE = 4
+    STATE = 5
+    NONCE = 6
+    SEQUENCE = 7
+    KIND = 8
+    TOO_LARGE = 9
+    MODEL = 10
+    BUSY = 11
+    FULL = 12
+
+
+class DeviceFlags(IntFlag):
+    """Of a record in an event frame."""
+
+    CONTACT = 1
+    BUTTON = 2
+    CLIPPED = 4
+    BEYOND = 8
+    EMPTY = 16
+    SIMULATED = 32
+    SLACK = 64

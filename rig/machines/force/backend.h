@@ -1,0 +1,45 @@
+/* A back end: all that the servo of tactileq needs of a force device. docs/force-device.md#another-device
+
+   Write these two functions for another device, and a Python class that opens it (`tactileq.rig.machines.force.backend`).
+   They are called by one thread, one to four thousand times a second, and must neither allocate nor wait
+   for longer than the device's own communication takes.
+
+   Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
+
+#ifndef TQ_BACKEND_H
+#define TQ_BACKEND_H
+
+/* The numbers of the law: double in the servo; a micro-controller without such a unit defines float. */
+#ifndef TQ_NUMBER
+#define TQ_NUMBER double
+#endif
+typedef TQ_NUMBER tq_number;
+
+#ifdef TQ_FREESTANDING
+#define TQ_ROOT_SINGLE __builtin_sqrtf
+#define TQ_ROOT_DOUBLE __builtin_sqrt
+#else
+#include <math.h>
+#define TQ_ROOT_SINGLE sqrtf
+#define TQ_ROOT_DOUBLE sqrt
+#endif
+#define TQ_ROOT(x)                                                                     \
+    (sizeof(tq_number) == sizeof(float) ? (tq_number)TQ_ROOT_SINGLE((float)(x))          \
+                                        : (tq_number)TQ_ROOT_DOUBLE((double)(x)))
+
+/* One reading. A device that cannot say where it is sets `failed`; the servo then ramps its force to 0 and
+   stays there. What the position is worth (NaN, a jump, the same for too long) is the servo's to judge. */
+typedef struct {
+    tq_number position_mm[3]; /* of the tool, in the device's own right-handed frame */
+    int failed;
+    int button; /* whether its button is down */
+} tq_sensed;
+
+typedef struct {
+    void *device; /* the back end's own; given to both functions */
+    void (*read)(void *device, tq_sensed *sensed);
+    /* Push with this force (N, device's frame) from now on; not 0 where that failed. */
+    int (*push)(void *device, const tq_number force_n[3]);
+} tq_backend;
+
+#endif

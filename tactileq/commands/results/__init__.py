@@ -1,0 +1,1 @@
+"""Commands from answers to a report and its archive."""

@@ -1,0 +1,123 @@
+"""tactileq publish: an archive of a study that stands alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from tactileq.own_results import check_own_results
+
+_WITH_MODELS = ("recordings", "models", "simplified")
+
+
+def publish(
+    data: Annotated[Path, typer.Argument(metavar="DATA", help="Folder of the study's answers.")],
+    study: Annotated[
+        Path, typer.Option("--study", help="Study file with [publication]: authors, licence, …")
+    ],
+    out: Annotated[Path, typer.Option("--out", help="Folder of the archive.")],
+    results: Annotated[
+        Path | None,
+        typer.Option(help="Results of tactileq analyze, whose options the report is made with."),
+    ] = None,
+    models: Annotated[
+        list[str] | None,
+        typer.Option(metavar="SET=FOLDER", help="Models, where they are not where they were."),
+    ] = None,
+    stimuli: Annotated[Path | None, typer.Option(help="Folder of a stimulus set.")] = None,
+    without: Annotated[
+        list[str] | None, typer.Option(metavar="SET", help="Set of models to leave out.")
+    ] = None,
+    free_text: Annotated[
+        bool, typer.Option("--free-text", help="Keep what people typed, such as reasons.")
+    ] = False,
+) -> None:
+    """Write data, plan, models, report and metadata into one folder that can be given to others.
+
+    Data are verified first. Times of day, pseudonyms and free text are left out; the copy's logs
+    are sealed anew, and the seals of the original are stated. The report is made from the copy.
+    BIDS errors, and files that would identify a participant or a machine, stop it. In the archive,
+    tactileq verify . checks every file, the data and the report. Needs the extra publish.
+
+    Example: tactileq publish data --study study.toml --out archive
+    """
+    from tactileq.experiments.publishing.archive import COMMAND, DATA
+    from tactileq.experiments.publishing.metadata import Publication
+    from tactileq.experiments.sessions.bids.validator import bids_issues, said_of
+    from tactileq.commands.results.analyze import analyze
+    from tactileq.experiments.study.study import Study
+    from tactileq.modeling import InputError
+    from tactileq.modeling.errors import counted
+    from tactileq.modeling.files.folders import replace_folder
+    from tactileq.modeling.files.hashes import seal_over, sha256_of_paths
+    from tactileq.modeling.files.provenance import provenance_of, seal_folder, sha256_of_files
+    from tactileq.commands.results.publishing import assemble, check_publishable, checked_models
+    from tactileq.commands.results.verification import require_verified
+
+    seen = check_own_results(out, COMMAND)
+    stated = Study.load(study)
+    found = require_verified(data, without=(), unverified=None)
+    if not found.manifests:
+        raise InputError(f"expected sessions in {data}, got none; name a folder with sourcedata.")
+    places, absent = checked_models(found.manifests, _places(models), without=without or ())
+    check_publishable(stated, models=places)
+    ran = Study.from_dict(found.manifests[0].study)
+    if ran.sha256 != stated.sha256:
+        raise InputError(
+            f"expected the study that {data} was run with, got another one in {study}; name its "
+            "own file, or change only [publication]."
+        )
+    options = _options_of(results, data) if results is not None else {}
+    if without and options.get("models"):
+        options |= dict.fromkeys(_WITH_MODELS)
+        print("note: the report is made without the chapters on models, which are left out.")
+    publication = Publication(
+        study=replace(ran, publication=stated.publication),
+        data=data,
+        models=places,
+        stimuli=stimuli,
+        options=options,
+        free_text=free_text,
+        simulated=found.manifests[0].simulated_participant,
+    )
+    (inputs,) = sha256_of_paths([data]).values()
+    with replace_folder(out, seen) as fresh:
+        told = assemble(fresh, publication, analyze=analyze)
+        if errors := [i for i in bids_issues(fresh / DATA) if i["severity"] == "error"]:
+            more = f" (and {counted(len(errors) - 1, 'more error')})" if errors[1:] else ""
+            raise InputError(
+                f"expected data that are valid BIDS, got {said_of(errors[0])}{more}; "
+                f"tactileq study validate {data} says more."
+            )
+        settings = {"free_text": free_text, "without": list(without or ())}
+        provenance = provenance_of(COMMAND, settings, inputs={"data": inputs})
+        seal = seal_over(sha256_of_files(fresh))
+        seal_folder(fresh, {**provenance, **told, "seal": seal})
+    for name in absent:
+        print(f"note: the {name} models are not here, and not in the archive.")
+    print(f"seal of the archive: {seal}")
+    print(out.resolve())
+
+
+def _places(models: list[str] | None) -> dict[str, Path]:
+    places = {}
+    for text in models or ():
+        name, _, folder = text.partition("=")
+        if not name or not folder:
+            raise ValueError(f"expected --models SET=FOLDER, got {text!r}; write both.")
+        places[name] = Path(folder)
+    return places
+
+
+def _options_of(results: Path, data: Path) -> dict[str, Any]:
+    """The options of the analysis of these data."""
+    from tactileq.modeling.files.documents import read_json_object
+    from tactileq.modeling.files.provenance import PROVENANCE_NAME
+    from tactileq.commands.results.verified_results import require_data
+
+    note = read_json_object(results / PROVENANCE_NAME, advice="name a folder of results")
+    require_data(note, data, results)
+    return dict(note.get("options", {}))
