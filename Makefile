@@ -37,7 +37,7 @@ install: .venv/installed
 	@touch $@
 
 # The project itself and its C parts; reports a missing compiler. Each header counts, whoever includes it.
-HEADERS := $(wildcard modeling/*/*.h rig/*/*.h benches/*/*.h)
+HEADERS := $(wildcard modeling/*/*.h rig/*/*/*.h benches/*/*.h)
 .venv/installed: .venv/packages pyproject.toml setup.py tools/c_parts.py modeling/rendering/call.c $(HEADERS)
 	@$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@$(BIN)/python -c "from tactileq.modeling.rendering.compiled import is_compiled; is_compiled()"

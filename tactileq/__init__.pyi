@@ -10,13 +10,13 @@ from tactileq.experiments.observers.psychometrics import Psychometrics as Psycho
 from tactileq.experiments.observers.psychometrics import Trait as Trait
 from tactileq.experiments.observers.whole_study import simulate_study as simulate_study
 from tactileq.experiments.publishing.presented import render_presentation as render_presentation
+from tactileq.experiments.sessions.kept.writer import StoreError as StoreError
 from tactileq.experiments.sessions.loop.running import Circumstances as Circumstances
 from tactileq.experiments.sessions.loop.running import run_session as run_session
 from tactileq.experiments.sessions.loop.task import Task as Task
 from tactileq.experiments.sessions.loop.trial_loop import People as People
 from tactileq.experiments.sessions.loop.trial_loop import SessionResult as SessionResult
 from tactileq.experiments.sessions.loop.trial_loop import run_trials as run_trials
-from tactileq.experiments.sessions.kept.writer import StoreError as StoreError
 from tactileq.experiments.study.design import SessionPlan as SessionPlan
 from tactileq.experiments.study.design import fisher_yates as fisher_yates
 from tactileq.experiments.study.models import ModelSets as ModelSets

@@ -14,31 +14,31 @@ from tactileq.interruption import Interrupted, ended_by_signals
 from tactileq.printing import print_warning, sentence_of
 from tactileq.workers import collect_less_often
 
-# The name of every command, and its file in tactileq/commands, which holds a function or a group of
-# commands of that file's name; in the order of tactileq --help.
+# The name of every command, and its module in tactileq/commands, which holds a function or a group
+# of commands of that module's name; in the order of tactileq --help.
 COMMANDS = {
-    "record": "record",
-    "rig": "rig",
-    "model": "model",
-    "simplify": "simplify",
-    "scene": "scene",
-    "stimuli": "stimuli",
-    "vibrator": "vibrator",
-    "feel": "feel",
-    "study": "study",
-    "power": "power",
-    "session": "session",
-    "threshold": "threshold",
-    "simulate": "simulate",
-    "analyze": "analyze",
-    "verify": "verify",
-    "publish": "publish",
-    "demo": "demo",
-    "import": "imports",
-    "export": "exports",
-    "bench": "bench",
-    "stability": "stability",
-    "schema": "schema",
+    "record": "recording.record",
+    "rig": "rig.rig",
+    "model": "models.model",
+    "simplify": "models.simplify",
+    "scene": "models.scene",
+    "stimuli": "models.stimuli",
+    "vibrator": "models.vibrator",
+    "feel": "rig.feel",
+    "study": "study.study",
+    "power": "study.power",
+    "session": "study.session",
+    "threshold": "study.threshold",
+    "simulate": "study.simulate",
+    "analyze": "results.analyze",
+    "verify": "results.verify",
+    "publish": "results.publish",
+    "demo": "benches.demo",
+    "import": "recording.imports",
+    "export": "models.exports",
+    "bench": "benches.bench",
+    "stability": "benches.stability",
+    "schema": "study.schema",
 }
 
 app = typer.Typer(
@@ -71,8 +71,8 @@ def options(
     """Options of the program itself; each acts through its callback."""
 
 
-for name, file in COMMANDS.items():
-    command = getattr(import_module(f"tactileq.commands.{file}"), file)
+for name, module in COMMANDS.items():
+    command = getattr(import_module(f"tactileq.commands.{module}"), module.split(".")[-1])
     if isinstance(command, typer.Typer):
         app.add_typer(command, name=name)
     else:

@@ -34,12 +34,12 @@ from tactileq.modeling.perception.thresholds import THRESHOLD_COLUMNS
 from tactileq.modeling.recordings.recording_set import KNOWN_COLUMNS
 from tactileq.modeling.recordings.trajectory import TRAJECTORY_COLUMNS, load_trajectory
 from tactileq.modeling.scenes.microcontrollers import CONTROLLER_COLUMNS, load_microcontrollers
-from tactileq.rig.recording.capture.grid import StrokeGrid
-from tactileq.rig.recording.capture.pieces import PIECE_COLUMNS, PieceStore, Plan
 from tactileq.rig.devices.hand.scripted import SCRIPT_COLUMNS
 from tactileq.rig.devices.hand.scripted import ScriptedTrajectory as Script
-from tactileq.rig.recording.importing.labels import LABEL_COLUMNS, labels_from_table
 from tactileq.rig.devices.sound.signals import OF_SURFACES, stimuli_of_surfaces
+from tactileq.rig.recording.capture.grid import StrokeGrid
+from tactileq.rig.recording.capture.pieces import PIECE_COLUMNS, PieceStore, Plan
+from tactileq.rig.recording.importing.labels import LABEL_COLUMNS, labels_from_table
 
 Load = Callable[[Path], object]
 ROOT = Path(__file__).parents[1]

@@ -82,7 +82,10 @@ PLANTED = {
     "modeling/fitting/field.py": ("tactileq.modeling.regression.driving", "Floors of modeling"),
     "stimuli/planted/textures.py": ("tactileq.stimuli.sets.recipe", "Floors of stimuli"),
     "rig/recording/importing/files.py": ("tactileq.rig.desk.twin", "Floors of rig"),
-    "experiments/study/study.py": ("tactileq.experiments.sessions.store.interface", "Floors of experiments"),
+    "experiments/study/study.py": (
+        "tactileq.experiments.sessions.store.interface",
+        "Floors of experiments",
+    ),
     "analysis/statistics/holm.py": ("tactileq.analysis.figures.answers", "Floors of analysis"),
     "analysis/spectra/findings.py": ("tactileq.benches.rendering.bench", "Data flows one way"),
     "benches/rendering/clicks.py": ("tactileq.benches.atlas.tables", "Floors of the benches"),

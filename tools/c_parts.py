@@ -3,9 +3,9 @@
 `tactileq.modeling.rendering._kernel` is the rendering kernel, `_kernel_single` the same in single
 precision, `_many` renders many streams side by side, `tactileq.modeling.estimation._slopes` is what
 the fit of layers spends its time on, `tactileq.benches.rendering._rivals` is what the bench
-compares, `tactileq.rig.shared.live._live` is the memory that processes of a rig share, the callback that
-plays and the servo of a force device, `tactileq.rig.machines.force._standin` a stand-in for the library of
-its maker, `tactileq.rig.machines.device._device` the firmware on a simulated board,
+compares, `tactileq.rig.shared.live._live` is the memory that processes of a rig share, the callback
+that plays and the servo of a force device, `tactileq.rig.machines.force._standin` a stand-in for
+the library of its maker, `tactileq.rig.machines.device._device` the firmware on a simulated board,
 `tactileq.rig.machines.recorder._recorder` the recorder's law on simulated mechanics.
 """
 
@@ -26,18 +26,21 @@ RIVALS = ROOT / "benches" / "rendering" / "rivals.h"
 SOUNDS = ROOT / "benches" / "rendering" / "sounds.h"
 PLAYER = ROOT / "modeling" / "rendering" / "player.h"
 WEIGH = ROOT / "modeling" / "rendering" / "weigh.h"
-CLOCK = ROOT / "rig" / "live" / "clock.h"
-LIVE = ROOT / "rig" / "live" / "live.h"
-SOUND = ROOT / "rig" / "live" / "sound.h"
-BACKEND = ROOT / "rig" / "force" / "backend.h"
-DHD = ROOT / "rig" / "force" / "dhd.h"
-FORCE = ROOT / "rig" / "force" / "force.h"
-OBSERVER = ROOT / "rig" / "force" / "observer.h"
-STROKE = ROOT / "rig" / "force" / "stroke.h"
-SERVO = ROOT / "rig" / "force" / "servo.h"
-DEVICE = ROOT / "rig" / "device"
-RECORDER = ROOT / "rig" / "recorder"
-STANDIN = ROOT / "rig" / "force" / "standin.h"
+SHARED = ROOT / "rig" / "shared" / "live"
+CLOCK = SHARED / "clock.h"
+LIVE = SHARED / "live.h"
+SOUND = SHARED / "sound.h"
+MACHINES = ROOT / "rig" / "machines"
+BACKEND = MACHINES / "force" / "backend.h"
+DHD = MACHINES / "force" / "dhd.h"
+FORCE = MACHINES / "force" / "force.h"
+OBSERVER = MACHINES / "force" / "observer.h"
+STROKE = MACHINES / "force" / "stroke.h"
+SERVO = MACHINES / "force" / "servo.h"
+STANDIN = MACHINES / "force" / "standin.h"
+BOARD = MACHINES / "board"
+DEVICE = MACHINES / "device"
+RECORDER = MACHINES / "recorder"
 # For GCC and Clang. A multiplication contracted with an addition would round otherwise than Python.
 COMPILER_ARGUMENTS = ["-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno"]
 # No result changes, but both ways of a choice may be computed, which vectors do.
@@ -182,22 +185,21 @@ def virtual_board() -> str:
     """Declarations of a simulated board in a process, whatever the device is."""
     public = r"^static (?:inline )?(\w[^;{}=]*?tq_virtual_(?:%s)\([^)]*\))(?=\s*\{)"
     names = "size|start|receive|step|take|given|shut|run"
-    text = (DEVICE / "virtual.h").read_text("utf-8")
+    text = (BOARD / "virtual.h").read_text("utf-8")
     found = dict.fromkeys(re.findall(public % names, text, re.MULTILINE))
     return "\n".join(("typedef struct tq_virtual tq_virtual;", *(f"{call};" for call in found)))
 
 
 def device_binding() -> FFI:
     """The builder of `_device`: the firmware on a simulated board."""
-    header = DEVICE / "virtual.h"
     builder = FFI()
     numbers = "typedef double tq_number;\n#define TQ_MOTORS 2"
     mechanics = (declarations(DEVICE / f"{name}.h") for name in ("cables", "mechanics"))
     builder.cdef("\n".join((numbers, *mechanics, virtual_board())))
-    folders = [DEVICE, FORCE.parent, KERNEL.parent, LIVE.parent]
+    folders = [DEVICE, BOARD, FORCE.parent, KERNEL.parent, LIVE.parent]
     builder.set_source(
         "tactileq.rig.machines.device._device",
-        f'#include "{header.name}"',
+        '#include "virtual.h"',
         include_dirs=[str(folder) for folder in folders],
         depends=headers_in(folders),
         define_macros=[("_GNU_SOURCE", None)],
@@ -210,7 +212,7 @@ def device_binding() -> FFI:
 def recorder_binding() -> FFI:
     """The builder of `_recorder`: the recorder's law on simulated mechanics."""
     headers = [OBSERVER, *(RECORDER / f"{name}.h" for name in ("control", "plant"))]
-    folders = [RECORDER, DEVICE, FORCE.parent, LIVE.parent]
+    folders = [RECORDER, BOARD, FORCE.parent, LIVE.parent]
     builder = FFI()
     builder.cdef(
         "\n".join(
@@ -226,7 +228,7 @@ def recorder_binding() -> FFI:
     )
     builder.set_source(
         "tactileq.rig.machines.recorder._recorder",
-        '#include "board.h"',
+        '#include "virtual.h"',
         include_dirs=[str(folder) for folder in folders],
         depends=headers_in(folders),
         define_macros=[("_GNU_SOURCE", None)],

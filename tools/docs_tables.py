@@ -10,31 +10,28 @@ test finds all of it current (tests/test_docs_tables.py).
 from __future__ import annotations
 
 import re
-import sys
 from functools import partial
 from pathlib import Path
 
+from tactileq.commands.study.schema import declared
+from tactileq.experiments.sessions.bids import events, people, physio
+from tactileq.experiments.sessions.kept import traces
+from tactileq.experiments.tasks import threshold_table
+from tactileq.modeling.files import answer_tables, stimulus_table
+from tactileq.modeling.files.columns import markdown
+from tactileq.modeling.files.describing import key_tables, schema_text
+from tactileq.modeling.perception import thresholds
+from tactileq.modeling.recordings import recording_set, trajectory
+from tactileq.modeling.scenes import microcontrollers
+from tactileq.rig.devices.hand import scripted
+from tactileq.rig.machines.device.definition import DEVICE
+from tactileq.rig.machines.recorder import store as recorder_store
+from tactileq.rig.machines.recorder.definition import RECORDER
+from tactileq.rig.recording.capture import pieces
+from tactileq.rig.recording.importing import labels
+from tactileq.rig.shared.wire import generating
+
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT))
-
-from tactileq.commands.study.schema import declared  # noqa: E402
-from tactileq.experiments.sessions.bids import (events as bids_events, people as bids_people, physio as bids_physio,)
-from tactileq.experiments.sessions.kept import traces  # noqa: E402
-from tactileq.experiments.tasks import threshold_table  # noqa: E402
-from tactileq.modeling.files import answer_tables, stimulus_table  # noqa: E402
-from tactileq.modeling.files.columns import markdown  # noqa: E402
-from tactileq.modeling.files.describing import key_tables, schema_text  # noqa: E402
-from tactileq.modeling.perception import thresholds  # noqa: E402
-from tactileq.modeling.recordings import recording_set, trajectory  # noqa: E402
-from tactileq.modeling.scenes import microcontrollers  # noqa: E402
-from tactileq.rig.recording.capture import pieces  # noqa: E402
-from tactileq.rig.machines.device.definition import DEVICE  # noqa: E402
-from tactileq.rig.devices.hand import scripted  # noqa: E402
-from tactileq.rig.recording.importing import labels  # noqa: E402
-from tactileq.rig.machines.recorder import store as recorder_store  # noqa: E402
-from tactileq.rig.machines.recorder.definition import RECORDER  # noqa: E402
-from tactileq.rig.shared.wire import generating  # noqa: E402
-
 TABLES = {
     "recordings": recording_set.KNOWN_COLUMNS,
     "labels": labels.LABEL_COLUMNS,
@@ -47,10 +44,10 @@ TABLES = {
     "measured-threshold": threshold_table.THRESHOLD_TABLE_COLUMNS,
     "microcontrollers": microcontrollers.CONTROLLER_COLUMNS,
     "participants": (answer_tables.PARTICIPANT_ID, *answer_tables.PARTICIPANT_COLUMNS),
-    "sessions": bids_people.SESSION_COLUMNS,
+    "sessions": people.SESSION_COLUMNS,
     **{f"answers-{task}": table.columns for task, table in answer_tables.ANSWER_TABLES.items()},
-    "events": bids_events.EVENT_COLUMNS,
-    "physio": bids_physio.PHYSIO_COLUMNS,
+    "events": events.EVENT_COLUMNS,
+    "physio": physio.PHYSIO_COLUMNS,
     "hand": traces.HAND_COLUMNS + traces.WALL_COLUMNS,
     "presentations": traces.PRESENTATION_COLUMNS,
 }
@@ -77,7 +74,10 @@ DEVICE_FILES = {
     "rig/machines/device/registers.py": (generating.python_module, DEVICE),
     "docs/device/vectors.json": (generating.vectors, DEVICE),
     "rig/machines/recorder/registers.h": (generating.c_header, RECORDER),
-    "rig/machines/recorder/registers.py": (partial(generating.python_module, prefix="Recorder"), RECORDER),
+    "rig/machines/recorder/registers.py": (
+        partial(generating.python_module, prefix="Recorder"),
+        RECORDER,
+    ),
 }
 _OF_A_DEVICE = {"registers": generating.register_table, "masks": generating.mask_tables}
 _MADE = {

@@ -18,9 +18,9 @@ import numpy as np
 import sounddevice
 
 from tactileq.modeling.rendering.limits import Limits
+from tactileq.rig.devices.sound.output import SoundOutput
 from tactileq.rig.shared.live.clock import now_s
 from tactileq.rig.shared.live.memory import Live
-from tactileq.rig.devices.sound.output import SoundOutput
 from tactileq.stimuli.planted.textures import planted_texture
 
 RATE_HZ, BLOCK = 48000, 128

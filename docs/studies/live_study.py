@@ -1,11 +1,11 @@
 """Processor time of audio blocks and the effect of a busy session: two ways to play under a hand.
 
 Simulated: JACK's dummy driver instead of a sound card, a planted texture (wall paper), a hand that
-strokes to and fro. *C callback*: `tactileq.rig.devices.sound`, a process of its own. *Python callback*:
-what one would write with sounddevice alone, `Renderer.render` in a callback of the session's
-process. In the second half of each run the session holds Python's lock for 0.8 s, as a slow page or
-a garbage collection may; after a second without it the rig would fall silent. A bare process that
-only sleeps until each block is due shows what the machine itself misses.
+strokes to and fro. *C callback*: `tactileq.rig.devices.sound`, a process of its own. *Python
+callback*: what one would write with sounddevice alone, `Renderer.render` in a callback of the
+session's process. In the second half of each run the session holds Python's lock for 0.8 s, as a
+slow page or a garbage collection may; after a second without it the rig would fall silent. A bare
+process that only sleeps until each block is due shows what the machine itself misses.
 
 Example: python docs/studies/live_study.py writes live_study.tsv beside this file and prints it.
 """
@@ -28,9 +28,9 @@ import pandas as pd
 
 from tactileq.modeling import Renderer
 from tactileq.modeling.rendering.limits import Limits
+from tactileq.rig.devices.sound.output import SoundOutput
 from tactileq.rig.shared.live.clock import now_s
 from tactileq.rig.shared.live.memory import UNDERFLOW, Live
-from tactileq.rig.devices.sound.output import SoundOutput
 from tactileq.stimuli.planted.textures import planted_texture
 
 RATE_HZ = 48000

@@ -13,7 +13,13 @@ from tactileq.experiments.console import intake_pages, trial_pages
 from tactileq.experiments.console.languages import Texts
 from tactileq.experiments.console.page_runner import PageHook, PageRunner
 from tactileq.experiments.console.screens import open_window
-from tactileq.experiments.sessions.loop.people import Choice, ChoiceTrial, Intake, RatedTrial, Rating
+from tactileq.experiments.sessions.loop.people import (
+    Choice,
+    ChoiceTrial,
+    Intake,
+    RatedTrial,
+    Rating,
+)
 from tactileq.experiments.sessions.loop.surfaces import Note, Surfaces
 from tactileq.experiments.sessions.loop.task import Task
 from tactileq.experiments.study.study import TASKS

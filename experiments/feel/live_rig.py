@@ -11,13 +11,13 @@ from tactileq.experiments.feel.rigs import NO_HAND, HandNow, OutputNow
 from tactileq.modeling import InputError
 from tactileq.modeling.models.loading import Layered
 from tactileq.modeling.rendering.plan import RenderCounters
-from tactileq.rig.machines.force.hand import ForceHand
-from tactileq.rig.machines.force.wall import Wall
 from tactileq.rig.devices.hand.reader import HandReader
-from tactileq.rig.shared.live.clock import now_s
-from tactileq.rig.shared.live.memory import CONTACT, FORCE_ASSUMED, GONE, OLDEST_READING_S, Live
 from tactileq.rig.devices.sound.supervision import SoundLost
 from tactileq.rig.devices.sound.vibration import VibrationOutput
+from tactileq.rig.machines.force.hand import ForceHand
+from tactileq.rig.machines.force.wall import Wall
+from tactileq.rig.shared.live.clock import now_s
+from tactileq.rig.shared.live.memory import CONTACT, FORCE_ASSUMED, GONE, OLDEST_READING_S, Live
 
 LEVEL_S = 0.25
 MASKING_LEVEL = 0.1  # RMS, share of full scale

@@ -16,11 +16,11 @@ from tactileq.rig.desk.parts import hand_reader, vibration_output
 from tactileq.rig.desk.walls import Walls, check_walls, usual_wall
 from tactileq.rig.devices.hand.reader import HandReader
 from tactileq.rig.devices.hand.settings import HandSettings
-from tactileq.rig.shared.live.memory import Live
-from tactileq.rig.shared.setup.rig_file import RigFile
 from tactileq.rig.devices.sound.devices import SoundDevice, find_device
 from tactileq.rig.devices.sound.output import SoundOutput
 from tactileq.rig.devices.sound.supervision import SoundLost
+from tactileq.rig.shared.live.memory import Live
+from tactileq.rig.shared.setup.rig_file import RigFile
 
 BLOCK = 256
 PIXELS_PER_MM = 3.78  # of a screen with 96 dots per inch

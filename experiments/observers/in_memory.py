@@ -14,15 +14,21 @@ from tactileq.experiments.observers.simulated import (
     require_plantable,
 )
 from tactileq.experiments.sessions.loop.order import draw_session
-from tactileq.experiments.sessions.store.interface import MemoryStore
 from tactileq.experiments.sessions.loop.trial_loop import People, run_trials
+from tactileq.experiments.sessions.store.interface import MemoryStore
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.study import Study
 from tactileq.experiments.tasks import task_named
 from tactileq.modeling.checks import check_whole
 from tactileq.modeling.models.loading import AnyModel
-from tactileq.rig.shared.interface import HandRows, PresentationRecord, RigReading, Stimulus, ToneBurst
 from tactileq.rig.desk.twin import SimulatedRig
+from tactileq.rig.shared.interface import (
+    HandRows,
+    PresentationRecord,
+    RigReading,
+    Stimulus,
+    ToneBurst,
+)
 
 Row = dict[str, object]
 Occasion = tuple[str, int, int]  # task, subject, session

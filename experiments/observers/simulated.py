@@ -20,7 +20,13 @@ from tactileq.experiments.observers.psychometrics import (
     choice_shares,
     with_effect,
 )
-from tactileq.experiments.sessions.loop.people import Choice, ChoiceTrial, Intake, RatedTrial, Rating
+from tactileq.experiments.sessions.loop.people import (
+    Choice,
+    ChoiceTrial,
+    Intake,
+    RatedTrial,
+    Rating,
+)
 from tactileq.experiments.sessions.loop.surfaces import Note, Surfaces
 from tactileq.experiments.study.questions import Question
 from tactileq.experiments.study.study import TASKS

@@ -12,7 +12,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactileq.experiments.publishing.archive import DATA, PSYCH_DS, RECORDINGS, REPORT, REPORTED, SETS_OF_MODELS, STIMULI
+from tactileq.experiments.publishing.archive import (
+    DATA,
+    PSYCH_DS,
+    RECORDINGS,
+    REPORT,
+    REPORTED,
+    SETS_OF_MODELS,
+    STIMULI,
+)
 
 if TYPE_CHECKING:
     from tactileq.experiments.study.publication import PublicationSection

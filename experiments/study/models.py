@@ -17,8 +17,8 @@ from tactileq.modeling.models.loading import load_any_models
 from tactileq.modeling.models.loading import made_from as model_made_from
 from tactileq.modeling.scenes.compiled import FILE as SCENE
 from tactileq.modeling.scenes.loading import scene_files, scene_models
-from tactileq.rig.shared.interface import Presentable, Stimulus
 from tactileq.rig.devices.sound.signals import stimuli_of_surfaces
+from tactileq.rig.shared.interface import Presentable, Stimulus
 
 # What may continue where a reason is given: a word for what, and the sentence that refuses it.
 Allow = Callable[[str, str], None]

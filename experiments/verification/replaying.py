@@ -10,9 +10,9 @@ from itertools import pairwise
 from typing import Any, cast
 
 from tactileq.experiments.sessions.kept.log import Event, plain
-from tactileq.experiments.sessions.loop.people import Choice, Rating, Respondent
 from tactileq.experiments.sessions.kept.resume import resumption
 from tactileq.experiments.sessions.kept.stored_sessions import StoredSession
+from tactileq.experiments.sessions.loop.people import Choice, Rating, Respondent
 from tactileq.experiments.sessions.loop.surfaces import Surfaces
 from tactileq.experiments.sessions.loop.task import Task
 from tactileq.experiments.study.design import Trial

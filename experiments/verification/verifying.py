@@ -12,13 +12,17 @@ from pathlib import Path
 from typing import Any
 
 from tactileq.experiments.sessions.bids.export import differing_tables
-from tactileq.experiments.sessions.kept.data_set import DESCRIPTION_NAME, MAY_DIFFER, describe_data_set
+from tactileq.experiments.sessions.kept.data_set import (
+    DESCRIPTION_NAME,
+    MAY_DIFFER,
+    describe_data_set,
+)
 from tactileq.experiments.sessions.kept.files import SessionFiles, require_data_folder, sessions_in
 from tactileq.experiments.sessions.kept.log import plain
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
-from tactileq.experiments.sessions.loop.order import draw_session
 from tactileq.experiments.sessions.kept.roster import Roster
 from tactileq.experiments.sessions.kept.stored_sessions import Damaged, StoredSession, held_sessions
+from tactileq.experiments.sessions.loop.order import draw_session
 from tactileq.experiments.study.study import Study, plan_sha256
 from tactileq.experiments.tasks import task_named
 from tactileq.experiments.verification.copies import copied

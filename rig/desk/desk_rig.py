@@ -25,9 +25,12 @@ from tactileq.rig.desk.parts import hand_reader, vibration_output
 from tactileq.rig.desk.pen import Pen
 from tactileq.rig.desk.stimuli import check_made_for, check_stimulus
 from tactileq.rig.desk.walls import Walls, check_walls, usual_wall
+from tactileq.rig.devices.hand.reader import HandReader
+from tactileq.rig.devices.sound.signals import tone_burst
+from tactileq.rig.devices.sound.supervision import SoundLost
+from tactileq.rig.devices.sound.vibration import Presented, VibrationOutput
 from tactileq.rig.machines.force.hand import ForceHand
 from tactileq.rig.machines.force.states import State
-from tactileq.rig.devices.hand.reader import HandReader
 from tactileq.rig.shared.interface import (
     Acceleration,
     Fault,
@@ -43,9 +46,6 @@ from tactileq.rig.shared.interface import (
 from tactileq.rig.shared.live.clock import now_s, sleep
 from tactileq.rig.shared.live.memory import GONE, OLDEST_READING_S, Live
 from tactileq.rig.shared.setup.rig_file import RigFile
-from tactileq.rig.devices.sound.signals import tone_burst
-from tactileq.rig.devices.sound.supervision import SoundLost
-from tactileq.rig.devices.sound.vibration import Presented, VibrationOutput
 
 FIRST_READING_S = 5.0
 LOOK_S = 0.1  # interval of checks while waiting for a burst

@@ -1,7 +1,7 @@
 """A rig in silico with hands that move: the cable device's firmware on simulated mechanics.
 
-As `tactileq.rig.desk.twin`, in virtual time and marked `simulated`, but speed, force and travel are not
-prescribed: a simulated hand strokes the virtual wall, which pushes back, and the device renders
+As `tactileq.rig.desk.twin`, in virtual time and marked `simulated`, but speed, force and travel are
+not prescribed: a simulated hand strokes the virtual wall, which pushes back, and the device renders
 under it (docs/cable-device.md#simulated-hands).
 """
 
@@ -20,6 +20,8 @@ from tactileq.modeling.models.texture_model import TextureModel
 from tactileq.modeling.rendering.limits import Limits
 from tactileq.modeling.rendering.plan import RenderCounters
 from tactileq.modeling.seeds import generator
+from tactileq.rig.desk.twin import STEP_S, SimulatedRig
+from tactileq.rig.machines.board.virtual import TICK_HZ, VirtualBoard, VirtualTransport
 from tactileq.rig.machines.device.definition import DEVICE
 from tactileq.rig.machines.device.models import ANY_DEVICE, device_model
 from tactileq.rig.machines.device.registers import (
@@ -30,7 +32,7 @@ from tactileq.rig.machines.device.registers import (
     DeviceSource,
     DeviceState,
 )
-from tactileq.rig.machines.device.virtual import TICK_HZ, VirtualBoard, VirtualTransport
+from tactileq.rig.machines.device.virtual import compiled_device
 from tactileq.rig.machines.force.wall import Wall
 from tactileq.rig.shared.interface import (
     SURFACES,
@@ -41,7 +43,6 @@ from tactileq.rig.shared.interface import (
     ToneBurst,
     grid_of,
 )
-from tactileq.rig.desk.twin import STEP_S, SimulatedRig
 from tactileq.rig.shared.wire.conversation import RECORD, Block, Conversation
 
 LOOK_S = 1.5  # that each surface is stroked at least
@@ -84,7 +85,7 @@ class DeviceTwin(SimulatedRig):
         super().__init__(real, seed=seed)
         self._look_s = look_s
         self._opened = 0
-        self._transport = VirtualTransport()
+        self._transport = VirtualTransport(VirtualBoard(compiled_device()))
         self._talk = Conversation(self._transport, DEVICE)
         self._before = RenderCounters()
         self._blocks: list[Block] = []
@@ -109,7 +110,7 @@ class DeviceTwin(SimulatedRig):
         self._opened += 1
         rng = generator(self._seed, self._opened)
         entropy = int(rng.integers(2**32))
-        self._transport = VirtualTransport(VirtualBoard(entropy=entropy))
+        self._transport = VirtualTransport(VirtualBoard(compiled_device(), entropy=entropy))
         self._talk = Conversation(self._transport, DEVICE)
         self._now, self._blocks, self._spans, self._fault = None, [], [], False
         super().open()

@@ -19,13 +19,8 @@ from tactileq.modeling.errors import InputError, counted
 from tactileq.modeling.extras import Extra, MissingExtra, install_advice
 from tactileq.modeling.files.provenance import version_of
 from tactileq.modeling.rendering.compiled import is_compiled
-from tactileq.rig.machines.force.dhd import UNTESTED, DhdLibrary
-from tactileq.rig.machines.force.wall import largest_stiffness_n_per_mm
 from tactileq.rig.devices.hand.devices import connected_devices
 from tactileq.rig.devices.hand.sample import ConnectedDevice
-from tactileq.rig.shared.live.compiled import compiled
-from tactileq.rig.shared.setup.force_sections import DeviceSection, ForceSection
-from tactileq.rig.shared.setup.rig_file import SHIPPED_RIG_FILE, RigFile
 from tactileq.rig.devices.sound.devices import (
     Direction,
     NoPortAudio,
@@ -35,6 +30,11 @@ from tactileq.rig.devices.sound.devices import (
     portaudio,
     sound_devices,
 )
+from tactileq.rig.machines.force.dhd import UNTESTED, DhdLibrary
+from tactileq.rig.machines.force.wall import largest_stiffness_n_per_mm
+from tactileq.rig.shared.live.compiled import compiled
+from tactileq.rig.shared.setup.force_sections import DeviceSection, ForceSection
+from tactileq.rig.shared.setup.rig_file import SHIPPED_RIG_FILE, RigFile
 
 State = Literal["ok", "note", "fault"]
 PACKAGES: dict[str, Extra | None] = {

@@ -8,17 +8,17 @@ from pathlib import Path
 
 from tactileq.modeling.vibrators.compensation import Compensation, compensation_for
 from tactileq.modeling.vibrators.exposure import hand_arm_sections
-from tactileq.rig.recording.capture.input import InputSettings
-from tactileq.rig.machines.force.hand import ForceHand
-from tactileq.rig.machines.force.settings import ForceSettings, Pose, Vibration
 from tactileq.rig.devices.hand.reader import HandReader
 from tactileq.rig.devices.hand.settings import HandSettings
+from tactileq.rig.devices.sound.output import SoundOutput
+from tactileq.rig.devices.sound.vibration import VibrationOutput
+from tactileq.rig.machines.force.hand import ForceHand
+from tactileq.rig.machines.force.settings import ForceSettings, Pose, Vibration
+from tactileq.rig.recording.capture.input import InputSettings
 from tactileq.rig.shared.live.clock import check_clock
 from tactileq.rig.shared.live.memory import Live
 from tactileq.rig.shared.setup.rig_file import RigFile
 from tactileq.rig.shared.setup.sections import AccelerometerSection
-from tactileq.rig.devices.sound.output import SoundOutput
-from tactileq.rig.devices.sound.vibration import VibrationOutput
 
 SILENT_S = 0.06  # beyond three blocks: a wall is released where nothing was played for so long
 

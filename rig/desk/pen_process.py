@@ -10,8 +10,8 @@ import threading
 
 import numpy as np
 
-from tactileq.rig.recording.capture.input import AudioInput, InputBlock, InputSettings
 from tactileq.rig.desk.messages import Begin, End, Listening, Request, SampleBlock, Take, Taken
+from tactileq.rig.recording.capture.input import AudioInput, InputBlock, InputSettings
 from tactileq.rig.shared.live.driven import Parent
 from tactileq.rig.shared.live.messages import Done, Message
 

@@ -18,6 +18,7 @@ from tactileq.modeling.errors import shown
 from tactileq.modeling.hand import Hand
 from tactileq.modeling.models.loading import AnyModel
 from tactileq.modeling.rendering.plan import RenderCounters
+from tactileq.rig.devices.sound.signals import tone_burst
 from tactileq.rig.shared.interface import (
     SURFACES,
     Acceleration,
@@ -31,7 +32,6 @@ from tactileq.rig.shared.interface import (
     ToneBurst,
     grid_of,
 )
-from tactileq.rig.devices.sound.signals import tone_burst
 
 STEP_S = 0.01
 ROW_S = 0.002  # of the history

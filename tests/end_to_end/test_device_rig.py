@@ -16,6 +16,7 @@ import pytest
 from tactileq.experiments.sessions.kept.log import read_log
 from tactileq.experiments.verification.verifying import verify_data
 from tactileq.rig.machines.board.emulating import Emulator
+from tactileq.rig.machines.device.machine import CABLE_DEVICE
 from tactileq.stimuli.planted.textures import planted_texture
 from tests.end_to_end.test_force_rig import press_down
 from tests.end_to_end.test_session_on_a_rig import (
@@ -37,7 +38,7 @@ stiffness_n_per_mm = 0.8
 
 @pytest.fixture
 def device(given_clock: None) -> Iterator[Emulator]:
-    with Emulator("process") as emulator:
+    with Emulator("process", CABLE_DEVICE) as emulator:
         yield emulator
 
 

@@ -15,9 +15,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tactileq.experiments.sessions.store.exposure import exposed_g2_s
 from tactileq.experiments.sessions.kept.log import read_log
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
+from tactileq.experiments.sessions.store.exposure import exposed_g2_s
 from tactileq.experiments.verification.verifying import verify_data
 from tactileq.modeling.vibrators.exposure import daily_exposure_m_s2
 from tactileq.rig.machines.force.standin import StandIn, library_path

@@ -43,19 +43,19 @@ from tactileq.modeling.recordings.trajectory import load_trajectory
 from tactileq.modeling.scenes.compiled import load_compiled
 from tactileq.modeling.scenes.hands import HandRange
 from tactileq.modeling.scenes.places import places_of
-from tactileq.rig.recording.capture.grid import StrokeGrid
-from tactileq.rig.recording.capture.pieces import PieceStore, Plan
 from tactileq.rig.desk.parts import hand_settings
 from tactileq.rig.devices.hand.scripted import ScriptedTrajectory
-from tactileq.rig.recording.importing.files import import_csv, import_wav
-from tactileq.rig.recording.importing.hatt_reader import load_hatt
-from tactileq.rig.recording.importing.labels import Label, labels_from_table
+from tactileq.rig.devices.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
+from tactileq.rig.devices.sound.signals import stimuli_of_surfaces
 from tactileq.rig.machines.recorder.evaluation import read_evaluation
 from tactileq.rig.machines.recorder.recorder_file import SHIPPED_RECORDER_FILE, RecorderFile
 from tactileq.rig.machines.recorder.store import RECORDER_COLUMNS, RecorderStore
+from tactileq.rig.recording.capture.grid import StrokeGrid
+from tactileq.rig.recording.capture.pieces import PieceStore, Plan
+from tactileq.rig.recording.importing.files import import_csv, import_wav
+from tactileq.rig.recording.importing.hatt_reader import load_hatt
+from tactileq.rig.recording.importing.labels import Label, labels_from_table
 from tactileq.rig.shared.setup.rig_file import SHIPPED_RIG_FILE, Figure, RigFile
-from tactileq.rig.devices.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
-from tactileq.rig.devices.sound.signals import stimuli_of_surfaces
 from tactileq.stimuli.planted.textures import planted_texture
 from tactileq.stimuli.planted.vibrators import planted_vibrator
 from tactileq.stimuli.sets.recipe import Recipe

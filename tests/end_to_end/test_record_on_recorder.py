@@ -18,9 +18,10 @@ from tactileq.analysis.textures.between import halfway, truth_summary
 from tactileq.modeling import RecordingSet, fit_texture
 from tactileq.modeling.files.tables import read_cells
 from tactileq.rig.machines.board.emulating import Emulator
-from tactileq.rig.shared.live.clock import now_s, sleep
+from tactileq.rig.machines.recorder.machine import SURFACE_RECORDER
 from tactileq.rig.machines.recorder.recorder_file import SHIPPED_RECORDER_FILE, RecorderFile
 from tactileq.rig.machines.recorder.store import RECORDER_COLUMNS, TABLE_NAME
+from tactileq.rig.shared.live.clock import now_s, sleep
 from tactileq.stimuli.planted.textures import (
     FORCES_N,
     RECORDER_RATE_HZ,
@@ -107,7 +108,7 @@ def test_a_killed_computer_goes_on_with_what_is_missing(main: Any, tmp_path: Pat
     words = ("record", "canvas", "--recorder", "recorder.toml", "--texture", "canvas")
     # A whole turn of the table: of a part of it the mean force depends on where it begins.
     words = (*words, "--duration", "1.3", "--grid", "grid.toml")
-    with Emulator("process", recorder=True) as emulator:
+    with Emulator("process", SURFACE_RECORDER) as emulator:
         (tmp_path / "recorder.toml").write_text(
             COLD.format(name=tmp_path.name, address=emulator.address)
         )
@@ -134,7 +135,7 @@ def test_a_killed_computer_goes_on_with_what_is_missing(main: Any, tmp_path: Pat
 
 
 def test_an_emulated_recorder_is_not_taken_for_a_real_one(main: Any, tmp_path: Path) -> None:
-    with Emulator("process", recorder=True) as emulator:
+    with Emulator("process", SURFACE_RECORDER) as emulator:
         text = COLD.format(name=tmp_path.name, address=emulator.address)
         (tmp_path / "recorder.toml").write_text(text.replace("simulated = true\n", ""))
         refused = main("record", "out", "--recorder", "recorder.toml", "--texture", "oak")

@@ -18,9 +18,9 @@ from typing import Any
 import pytest
 
 from tactileq.modeling import ARModel, TextureModel
-from tactileq.rig.shared.setup.rig_file import RigFile
 from tactileq.rig.devices.simulated.card import DEVICE, SimulatedCard
 from tactileq.rig.devices.simulated.vibrator import SimulatedTransducers
+from tactileq.rig.shared.setup.rig_file import RigFile
 from tactileq.stimuli.planted.textures import planted_texture
 from tests.modeling.rendering.lattices import planted_ar
 from tests.rig.desk.calibration.card import rig_file

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from tactileq.experiments.sessions.bids import events as bids_events
+from tactileq.experiments.sessions.bids import events
 from tactileq.experiments.sessions.bids.tables import json_bytes, table_bytes
 from tactileq.experiments.sessions.kept.files import SessionFiles
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
@@ -68,10 +68,10 @@ def _columns(held: StoredSession) -> list[AnswerColumn]:
 
 
 def _events(held: StoredSession, presentations: list[dict[str, str]]) -> Made:
-    rows = bids_events.event_rows(held.state.events, presentations)
+    rows = events.event_rows(held.state.events, presentations)
     table = held.files.beh / f"{held.files.stem}_events.tsv"
-    described = sidecar_of(bids_events.EVENT_COLUMNS)
-    described["trial_type"]["Levels"] = bids_events.trial_types(rows)
+    described = sidecar_of(events.EVENT_COLUMNS)
+    described["trial_type"]["Levels"] = events.trial_types(rows)
     manifest = held.manifest
     sidecar = {
         "TaskName": manifest.task,
@@ -84,7 +84,7 @@ def _events(held: StoredSession, presentations: list[dict[str, str]]) -> Made:
         **described,
     }
     return {
-        table: table_bytes(bids_events.EVENT_COLUMNS, rows),
+        table: table_bytes(events.EVENT_COLUMNS, rows),
         table.with_suffix(".json"): json_bytes(sidecar),
     }
 
@@ -95,33 +95,34 @@ def _hand(held: StoredSession, runs: set[int]) -> tuple[Made, tuple[str, ...]]:
     found = hand_rows(path, runs=runs)
     if not found.rows:
         return {}, found.damaged
-    from tactileq.experiments.sessions.bids import physio as bids_physio
+    # late: pandas takes longer to load than all else
+    from tactileq.experiments.sessions.bids import physio
 
-    onsets = bids_events.onsets_s(held.state.events)
+    onsets = events.onsets_s(held.state.events)
     made, damaged = {}, [*found.damaged]
-    for run, readings in bids_physio.by_run(_readings(found)).items():
-        if wrong := bids_physio.damaged_readings(readings):
+    for run, readings in physio.by_run(_readings(found)).items():
+        if wrong := physio.damaged_readings(readings):
             damaged.append(f"{wrong} {path.name}, so no table of start {run}")
             continue
         stem = held.files.beh / f"{held.files.stem}_recording-start{run}_physio"
-        start_s = bids_physio.start_onset_s(readings, held.state.events, onsets, run=run)
+        start_s = physio.start_onset_s(readings, held.state.events, onsets, run=run)
         made[Path(f"{stem}.json")] = json_bytes(
             {
-                "SamplingFrequency": bids_physio.RATE_HZ,
+                "SamplingFrequency": physio.RATE_HZ,
                 "StartTime": start_s,
-                "Columns": names(bids_physio.PHYSIO_COLUMNS),
+                "Columns": names(physio.PHYSIO_COLUMNS),
                 "TaskName": held.manifest.task,
                 "PhysioType": "generic",
                 **_simulated(held.manifest),
                 **sidecar_of(
-                    bids_physio.COMMANDED_COLUMNS
+                    physio.COMMANDED_COLUMNS
                     if "Walls" in held.manifest.rig
-                    else bids_physio.PHYSIO_COLUMNS
+                    else physio.PHYSIO_COLUMNS
                 ),
             }
         )
-        regular = bids_physio.at_regular_times(readings)
-        made[Path(f"{stem}.tsv.gz")] = bids_physio.physio_bytes(regular)
+        regular = physio.at_regular_times(readings)
+        made[Path(f"{stem}.tsv.gz")] = physio.physio_bytes(regular)
     return made, tuple(damaged)
 
 

@@ -7,7 +7,11 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from tactileq.experiments.sessions.kept.traces import HAND_COLUMNS, PRESENTATION_COLUMNS, WALL_COLUMNS
+from tactileq.experiments.sessions.kept.traces import (
+    HAND_COLUMNS,
+    PRESENTATION_COLUMNS,
+    WALL_COLUMNS,
+)
 from tactileq.modeling import InputError
 from tactileq.modeling.errors import counted
 from tactileq.modeling.files.columns import Column, Columns, names

@@ -12,7 +12,13 @@ import numpy as np
 from tactileq.experiments.sessions.kept.strokes import Outside, outside_grid
 from tactileq.modeling import InputError
 from tactileq.modeling.files.columns import Column
-from tactileq.rig.shared.interface import SURFACES, Acceleration, Fault, HandRows, PresentationRecord
+from tactileq.rig.shared.interface import (
+    SURFACES,
+    Acceleration,
+    Fault,
+    HandRows,
+    PresentationRecord,
+)
 
 _CLOCK = "seconds since the rig was opened"
 _NUMBER = (-inf, inf)

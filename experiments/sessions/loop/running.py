@@ -9,21 +9,21 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from tactileq.experiments.sessions.loop.agenda import Agenda
-from tactileq.experiments.sessions.store.exposure import exposed_g2_s
 from tactileq.experiments.sessions.kept.log import read_log
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
-from tactileq.experiments.sessions.loop.order import draw_session
 from tactileq.experiments.sessions.kept.overrides import Overrides
-from tactileq.experiments.sessions.loop.people import Intake
 from tactileq.experiments.sessions.kept.program import program_facts
 from tactileq.experiments.sessions.kept.resume import resumption
 from tactileq.experiments.sessions.kept.roster import LastSeal, Roster, RosterEntry
-from tactileq.experiments.sessions.store.session_store import SessionStore
 from tactileq.experiments.sessions.kept.stored_sessions import held_session
+from tactileq.experiments.sessions.kept.writer import StoreError
+from tactileq.experiments.sessions.loop.agenda import Agenda
+from tactileq.experiments.sessions.loop.order import draw_session
+from tactileq.experiments.sessions.loop.people import Intake
 from tactileq.experiments.sessions.loop.task import Task
 from tactileq.experiments.sessions.loop.trial_loop import People, SessionResult, run_trials
-from tactileq.experiments.sessions.kept.writer import StoreError
+from tactileq.experiments.sessions.store.exposure import exposed_g2_s
+from tactileq.experiments.sessions.store.session_store import SessionStore
 from tactileq.experiments.study.design import SessionPlan
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.study import Study, plan_sha256
@@ -101,8 +101,8 @@ def run_session(
     SessionResult
         Not completed if somebody ended it early.
     Path
-        Its manifest, beside which its log lies; `tactileq.experiments.sessions.bids.export` makes tables
-        of them.
+        Its manifest, beside which its log lies; `tactileq.experiments.sessions.bids.export` makes
+        tables of them.
 
     Raises
     ------

@@ -13,8 +13,8 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from statistics import median
 
+from tactileq.experiments.sessions.kept.strokes import OFTEN, advice_on, beyond_edge, outside_grid
 from tactileq.experiments.sessions.loop.agenda import Agenda
-from tactileq.experiments.sessions.store.exposure import EXPOSURE, Exposure
 from tactileq.experiments.sessions.loop.people import (
     Experimenter,
     Intake,
@@ -22,10 +22,10 @@ from tactileq.experiments.sessions.loop.people import (
     Respondent,
     SessionAborted,
 )
-from tactileq.experiments.sessions.store.interface import Store
-from tactileq.experiments.sessions.kept.strokes import OFTEN, advice_on, beyond_edge, outside_grid
 from tactileq.experiments.sessions.loop.surfaces import Surfaces
 from tactileq.experiments.sessions.loop.task import Task
+from tactileq.experiments.sessions.store.exposure import EXPOSURE, Exposure
+from tactileq.experiments.sessions.store.interface import Store
 from tactileq.experiments.study.design import SessionPlan, Trial
 from tactileq.experiments.study.models import ModelSets
 from tactileq.rig.shared.interface import Fault, HandRows, PresentationRecord, TextureRig

@@ -15,7 +15,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from tactileq.experiments.sessions.store.admission import admit, refuse_begun
 from tactileq.experiments.sessions.kept.data_set import differing
 from tactileq.experiments.sessions.kept.files import (
     SessionFiles,
@@ -37,6 +36,7 @@ from tactileq.experiments.sessions.kept.traces import (
     presentation_table,
 )
 from tactileq.experiments.sessions.kept.writer import LogWriter, StoreError, store_error
+from tactileq.experiments.sessions.store.admission import admit, refuse_begun
 from tactileq.modeling import InputError
 from tactileq.modeling.errors import shown
 from tactileq.modeling.files.columns import Column, sidecar

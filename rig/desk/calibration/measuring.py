@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import InputError
-from tactileq.rig.recording.capture.input import AudioInput, InputBlock
 from tactileq.rig.devices.sound.vibration import Presented
+from tactileq.rig.recording.capture.input import AudioInput, InputBlock
 
 AROUND_S = 0.3
 LOST = "lost samples"

@@ -7,14 +7,14 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from tactileq.modeling.errors import InputError
-from tactileq.rig.recording.capture.input import AudioInput
 from tactileq.rig.desk.lock import rig_locked
 from tactileq.rig.desk.parts import hand_settings, input_settings, vibration_output
 from tactileq.rig.devices.hand.reader import HandReader
-from tactileq.rig.shared.live.memory import Live
-from tactileq.rig.shared.setup.rig_file import RigFile
 from tactileq.rig.devices.sound.supervision import SoundLost
 from tactileq.rig.devices.sound.vibration import VibrationOutput
+from tactileq.rig.recording.capture.input import AudioInput
+from tactileq.rig.shared.live.memory import Live
+from tactileq.rig.shared.setup.rig_file import RigFile
 
 # With these points a pen's "force" is its pressure, as a share of its range.
 PRESSURE_ITSELF = ((0.0, 0.0), (1.0, 1.0))

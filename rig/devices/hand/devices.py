@@ -29,7 +29,9 @@ def open_device(settings: HandSettings) -> Device:
 
         return SerialSensor.open(settings)
     if settings.kind in ("tablet", "mouse") and sys.platform == "linux":
-        from tactileq.rig.devices.hand.evdev import EventDevice  # which needs calls that only Linux has
+        from tactileq.rig.devices.hand.evdev import (
+            EventDevice,  # which needs calls that only Linux has
+        )
 
         return EventDevice.open(settings)
     if settings.kind == "force":

@@ -1,7 +1,7 @@
 """The hand's process: reads the device, filters, writes readings.
 
-`tactileq.rig.devices.hand.messages` go between it and `tactileq.rig.devices.hand.reader`. Where its parent is gone,
-it ends (docs/method/hand.md#process).
+`tactileq.rig.devices.hand.messages` go between it and `tactileq.rig.devices.hand.reader`. Where its
+parent is gone, it ends (docs/method/hand.md#process).
 """
 
 from __future__ import annotations

@@ -9,7 +9,15 @@ from typing import Any, Self
 
 from tactileq.modeling.errors import InputError
 from tactileq.rig.devices.hand.following import Follower
-from tactileq.rig.devices.hand.messages import Counts, Firmware, HandFault, ReadHand, Ready, Report, Unplug
+from tactileq.rig.devices.hand.messages import (
+    Counts,
+    Firmware,
+    HandFault,
+    ReadHand,
+    Ready,
+    Report,
+    Unplug,
+)
 from tactileq.rig.devices.hand.settings import HandSettings
 from tactileq.rig.devices.hand.tracking import REST_S
 from tactileq.rig.devices.hand.window import WindowHand

@@ -1,4 +1,4 @@
-"""A thread that does nothing but wake up in time: `python -m tactileq.rig.devices.monitoring.bare_thread`.
+"""A process whose thread does nothing but wake up in time.
 
 Its misses are due to the machine; they are shown beside those of the audio callback.
 It is started with its period in seconds.

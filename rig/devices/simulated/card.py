@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from tactileq.modeling.errors import InputError
-from tactileq.rig.shared.live.child import Child, ChildLost
-from tactileq.rig.shared.live.messages import Done
 from tactileq.rig.devices.simulated.process import Card
 from tactileq.rig.devices.simulated.vibrator import SimulatedTransducers
+from tactileq.rig.shared.live.child import Child, ChildLost
+from tactileq.rig.shared.live.messages import Done
 
 DEVICE = "simulated-vibrator"
 
@@ -36,7 +36,9 @@ class SimulatedCard:
         InputError
             Without a JACK server.
         """
-        self._child = Child("tactileq.rig.devices.simulated.process", Card(self.vibrator, self.name))
+        self._child = Child(
+            "tactileq.rig.devices.simulated.process", Card(self.vibrator, self.name)
+        )
         try:
             self._child.ready(Done)
         except ChildLost as lost:

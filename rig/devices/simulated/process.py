@@ -13,10 +13,10 @@ import numpy as np
 
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import InputError, shown
-from tactileq.rig.shared.live.driven import Parent
-from tactileq.rig.shared.live.messages import Done, Message
 from tactileq.rig.devices.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
 from tactileq.rig.devices.sound.devices import SoundDevice, portaudio, sound_devices
+from tactileq.rig.shared.live.driven import Parent
+from tactileq.rig.shared.live.messages import Done, Message
 
 CHANNELS = 2
 

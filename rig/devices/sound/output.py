@@ -21,9 +21,6 @@ from tactileq.modeling.rendering.plan import usual_update_s
 from tactileq.modeling.vibrators.compensation import Compensation
 from tactileq.modeling.vibrators.exposure import hand_arm_sections
 from tactileq.modeling.vibrators.vibrator import Vibrator
-from tactileq.rig.shared.live.child import ChildLost
-from tactileq.rig.shared.live.memory import Live, Rows
-from tactileq.rig.shared.live.messages import Done
 from tactileq.rig.devices.sound.messages import (
     Corrected,
     Count,
@@ -35,6 +32,9 @@ from tactileq.rig.devices.sound.messages import (
 )
 from tactileq.rig.devices.sound.supervision import HALTED, SoundLost, SoundProcess
 from tactileq.rig.devices.sound.vibration import Counted, Presented, VibrationOutput
+from tactileq.rig.shared.live.child import ChildLost
+from tactileq.rig.shared.live.memory import Live, Rows
+from tactileq.rig.shared.live.messages import Done
 
 LOUDEST_MASKING = 0.5
 _MASKING_STREAM = 2**63

@@ -1,8 +1,8 @@
 """The process that plays, driven by `tactileq.rig.devices.sound.messages`.
 
 A process of its own, so that nothing that the experiment does delays it and it can be killed when a
-sound server hangs. PortAudio calls `tq_sound_callback` (`rig/shared/live/sound.h`); Python here only
-prepares what shall play. When its input ends, which means that its parent is gone, it fades to
+sound server hangs. PortAudio calls `tq_sound_callback` (`rig/shared/live/sound.h`); Python here
+only prepares what shall play. When its input ends, which means that its parent is gone, it fades to
 silence and ends. docs/method/live.md#processes
 """
 
@@ -19,11 +19,6 @@ import numpy as np
 from tactileq.modeling.errors import InputError
 from tactileq.modeling.rendering.compiled import filled, memory_reals, render_counters
 from tactileq.modeling.rendering.plan import RenderCounters
-from tactileq.rig.shared.live.clock import is_given, now_s
-from tactileq.rig.shared.live.compiled import compiled
-from tactileq.rig.shared.live.driven import Parent
-from tactileq.rig.shared.live.memory import HEARTBEAT_S, OLDEST_READING_S, Live
-from tactileq.rig.shared.live.messages import Done, Message
 from tactileq.rig.devices.sound.devices import check_rate, find_device, portaudio
 from tactileq.rig.devices.sound.messages import (
     Corrected,
@@ -37,6 +32,11 @@ from tactileq.rig.devices.sound.messages import (
     Silence,
     SoundSettings,
 )
+from tactileq.rig.shared.live.clock import is_given, now_s
+from tactileq.rig.shared.live.compiled import compiled
+from tactileq.rig.shared.live.driven import Parent
+from tactileq.rig.shared.live.memory import HEARTBEAT_S, OLDEST_READING_S, Live
+from tactileq.rig.shared.live.messages import Done, Message
 
 FADE_S = 5e-3
 LONGEST_END_S = 1.0  # PortAudio hangs where its server has died

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from tactileq.modeling.errors import InputError
+from tactileq.rig.devices.sound.messages import Mask, Playing, SoundSettings
+from tactileq.rig.devices.sound.played import STALLED_S, PlayedBlocks
 from tactileq.rig.shared.live.child import Child, ChildLost, Reply
 from tactileq.rig.shared.live.clock import now_s, sleep
 from tactileq.rig.shared.live.memory import HEARTBEAT_S, Rows
 from tactileq.rig.shared.live.messages import Done, Message
-from tactileq.rig.devices.sound.messages import Mask, Playing, SoundSettings
-from tactileq.rig.devices.sound.played import STALLED_S, PlayedBlocks
 
 _POLL_S = 0.001
 HALTED = (

@@ -17,10 +17,10 @@ from tactileq.modeling.models.loading import AnyModel
 from tactileq.modeling.rendering.limits import Limits
 from tactileq.modeling.rendering.plan import RenderCounters, RenderPlan, plan_for
 from tactileq.modeling.vibrators.compensation import Compensation
-from tactileq.rig.shared.live.clock import now_s, sleep
-from tactileq.rig.shared.live.memory import OLDEST_READING_S, Live, Rows
 from tactileq.rig.devices.sound.played import STALLED_S, PlayedBlocks
 from tactileq.rig.devices.sound.signal_limits import check_signal, largest_factor
+from tactileq.rig.shared.live.clock import now_s, sleep
+from tactileq.rig.shared.live.memory import OLDEST_READING_S, Live, Rows
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,5 +1,4 @@
-"""Starts an emulated device or recorder for those without a board: a process, or QEMU with the
-firmware."""
+"""Starts an emulated machine for those without a board: a process, or QEMU with the firmware."""
 
 from __future__ import annotations
 
@@ -7,19 +6,18 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from tactileq.modeling.errors import InputError
-from tactileq.rig.machines.device.virtual import compiled_device
 from tactileq.rig.shared.wire.transports import SOCKET
 
 Kind = Literal["process", "m7", "stm32"]
 KINDS: tuple[Kind, ...] = ("process", "m7", "stm32")
-ROOT = Path(__file__).parents[3]
-_FIRMWARE = Path(__file__).parent
+_HERE = Path(__file__).parent
 _COMPILER = "arm-none-eabi-gcc"
 # Of an UART whose samples of a bit are 16 clocks: what both sides bear together.
 _WORST_BAUD = 0.02
@@ -43,6 +41,28 @@ class QemuBoard:
     name: str
     clock_hz: float
     options: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Machine:
+    """What a board with our firmware can be.
+
+    Parameters
+    ----------
+    process : str
+        The module whose process is an emulated one.
+    folders : tuple of Path
+        Of its simulated.h and of all headers that this includes beside the board's.
+    macros : tuple of str
+        That the compiler is given.
+    compiled : callable
+        Gives its firmware, compiled for a simulated board; InputError where there is none.
+    """
+
+    process: str
+    folders: tuple[Path, ...]
+    macros: tuple[str, ...]
+    compiled: Callable[[], Any]
 
 
 BOARDS: dict[str, QemuBoard] = {
@@ -84,7 +104,7 @@ def check_baud(kind: Kind, baud: int) -> None:
 
 
 def build_firmware(
-    kind: Kind, file: Path, *, baud: int, simulated: bool = True, recorder: bool = False
+    kind: Kind, machine: Machine, file: Path, *, baud: int, simulated: bool = True
 ) -> Path:
     """Compile the firmware of a board.
 
@@ -94,8 +114,6 @@ def build_firmware(
         To be written (ELF).
     simulated : bool
         Whether a simulated hand, or simulated mechanics, take the place of encoders and motors.
-    recorder : bool
-        Whether it is a recorder's, not a cable device's.
 
     Raises
     ------
@@ -108,14 +126,14 @@ def build_firmware(
             f"expected {_COMPILER} for the firmware of {kind}, got none; install it (Debian: "
             "gcc-arm-none-eabi libnewlib-arm-none-eabi), or emulate process."
         )
-    folders = [_FIRMWARE, _FIRMWARE / "boards", ROOT / "rig/machines/force", ROOT / "modeling/rendering"]
+    folders = [_HERE, _HERE / "boards", *machine.folders]
     command = [_COMPILER, "-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-mthumb"]
     command += ["-mfloat-abi=hard", *board.options, f"-DBAUD={baud}"]
-    command += ["-DTQ_SIMULATED"] * simulated + ["-DTQ_RECORDER"] * recorder
+    command += ["-DTQ_SIMULATED"] * simulated + [f"-D{macro}" for macro in machine.macros]
     command += [f"-I{folder}" for folder in folders]
     command += ["-ffunction-sections", "-Wl,--gc-sections", "-nostartfiles", "-specs=nano.specs"]
-    command += ["-T", str(_FIRMWARE / "boards" / f"{board.name}.ld")]
-    command += [str(_FIRMWARE / "boards" / f"{board.name}.c"), str(_FIRMWARE / "firmware.c")]
+    command += ["-T", str(_HERE / "boards" / f"{board.name}.ld")]
+    command += [str(_HERE / "boards" / f"{board.name}.c"), str(_HERE / "firmware.c")]
     done = subprocess.run(
         [*command, "-o", str(file), "-lm"], capture_output=True, text=True, check=False
     )
@@ -128,17 +146,16 @@ def build_firmware(
 
 
 class Emulator:
-    """An emulated device while this is open; it ends with this process, however that ends.
+    """An emulated machine while this is open; it ends with this process, however that ends.
 
     Parameters
     ----------
     kind : {"process", "m7", "stm32"}
+    machine : Machine
     baud : int, optional
         Of its port, which limits the records that it sends.
     port : int
         Of a TCP socket on this computer instead of a pseudo-terminal; 0 for none.
-    recorder : bool
-        Whether it is a recorder of surfaces, not a cable device.
 
     Attributes
     ----------
@@ -149,9 +166,9 @@ class Emulator:
     """
 
     def __init__(
-        self, kind: Kind, *, baud: int | None = None, port: int = 0, recorder: bool = False
+        self, kind: Kind, machine: Machine, *, baud: int | None = None, port: int = 0
     ) -> None:
-        self._kind, self._recorder = kind, recorder
+        self._kind, self._machine = kind, machine
         self._baud = USUAL_BAUD[kind] if baud is None else baud
         self._port = port
         self._stack = ExitStack()
@@ -170,14 +187,12 @@ class Emulator:
         """
         check_baud(self._kind, self._baud)
         what: str = self._kind
-        program = "tactileq.rig.machines.device.process"
         if self._kind == "process":
-            compiled_device()  # where it is, the recorder is, too
-            program = "tactileq.rig.machines.recorder.process" if self._recorder else program
+            self._machine.compiled()
         else:
             self.firmware = self._built()
             what = f"{BOARDS[self._kind].machine}:{self.firmware}"
-        command = [sys.executable, "-m", program, what]
+        command = [sys.executable, "-P", "-m", self._machine.process, what]
         self._child = subprocess.Popen(
             [*command, str(self._baud), str(self._port)],
             stdin=subprocess.PIPE,
@@ -201,9 +216,8 @@ class Emulator:
                 "qemu-system-arm), or emulate process."
             )
         folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
-        return build_firmware(
-            self._kind, folder / "firmware.elf", baud=self._baud, recorder=self._recorder
-        )
+        file = folder / "firmware.elf"
+        return build_firmware(self._kind, self._machine, file, baud=self._baud)
 
     @property
     def pid(self) -> int:

@@ -5,7 +5,7 @@
 #ifndef TQ_VIRTUAL_H
 #define TQ_VIRTUAL_H
 
-#include "simulated.h"
+#include "simulated.h" /* of the machine, by the compiler's folders: it includes all else */
 
 #include <stdlib.h>
 

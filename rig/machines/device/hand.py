@@ -7,11 +7,11 @@ import threading
 from typing import Any
 
 from tactileq.modeling.errors import InputError
+from tactileq.rig.devices.hand.messages import Report
+from tactileq.rig.devices.hand.settings import HandSettings
 from tactileq.rig.machines.device.messages import DeviceAnswer, DeviceRequest, Wanted
 from tactileq.rig.machines.force.hand import ForceHand
 from tactileq.rig.machines.force.settings import ForceSettings
-from tactileq.rig.devices.hand.messages import Report
-from tactileq.rig.devices.hand.settings import HandSettings
 from tactileq.rig.shared.live.child import ChildLost
 from tactileq.rig.shared.live.clock import holding, next_of, now_s
 from tactileq.rig.shared.live.memory import Live

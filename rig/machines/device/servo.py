@@ -1,8 +1,8 @@
-"""A device that renders by itself in the place of a servo: `python -m tactileq.rig.machines.device.servo`.
+"""The process of a device that renders by itself, in the place of a servo.
 
-It is driven by `tactileq.rig.machines.force.messages` and speaks to the other processes of a rig as the
-servo of a force device does (rig/machines/force/servo.h): what they ask for goes over the wire, and records
-come back as readings of the hand. The law runs in the device (docs/device.md#in-a-rig).
+It is driven by `tactileq.rig.machines.force.messages` and speaks to the other processes of a rig as
+the servo of a force device does (rig/machines/force/servo.h): what they ask for goes over the wire,
+and records come back as readings of the hand. The law runs in the device (docs/device.md#in-a-rig).
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import threading
 from contextlib import suppress
 
 from tactileq.modeling.errors import InputError
+from tactileq.rig.devices.hand.messages import Firmware, Ready
 from tactileq.rig.machines.device.definition import DEVICE
 from tactileq.rig.machines.device.messages import DeviceAnswer, DeviceRequest
 from tactileq.rig.machines.device.registers import DeviceCommand, DeviceFlags, DeviceStatus
@@ -20,10 +21,16 @@ from tactileq.rig.machines.force.serving import ServedServo, serve_servo
 from tactileq.rig.machines.force.settings import ForceSettings
 from tactileq.rig.machines.force.states import Ask, Cause, State
 from tactileq.rig.machines.force.words import ServoWords
-from tactileq.rig.devices.hand.messages import Firmware, Ready
 from tactileq.rig.shared.live.clock import now_s, sleep, taking_part
 from tactileq.rig.shared.live.driven import Parent
-from tactileq.rig.shared.live.memory import BEYOND, BUTTON, CONTACT, FORCE_COMMANDED, SIMULATED, Live
+from tactileq.rig.shared.live.memory import (
+    BEYOND,
+    BUTTON,
+    CONTACT,
+    FORCE_COMMANDED,
+    SIMULATED,
+    Live,
+)
 from tactileq.rig.shared.setup.rig_file import DEVICE_RATE_HZ
 from tactileq.rig.shared.wire.conversation import Block, DeviceRefused
 from tactileq.rig.shared.wire.link import Link

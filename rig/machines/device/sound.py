@@ -17,6 +17,10 @@ from tactileq.modeling.errors import InputError
 from tactileq.modeling.models.loading import AnyModel
 from tactileq.modeling.rendering.limits import Limits
 from tactileq.modeling.vibrators.compensation import Compensation
+from tactileq.rig.devices.sound.output import SoundOutput, check_masking
+from tactileq.rig.devices.sound.played import STALLED_S
+from tactileq.rig.devices.sound.supervision import HALTED, SoundLost
+from tactileq.rig.devices.sound.vibration import Counted, Presented, VibrationOutput
 from tactileq.rig.machines.device.hand import DeviceHand
 from tactileq.rig.machines.device.messages import (
     CountCorrections,
@@ -30,10 +34,6 @@ from tactileq.rig.shared.live.child import ChildLost
 from tactileq.rig.shared.live.clock import now_s, sleep
 from tactileq.rig.shared.live.memory import Live, Rows
 from tactileq.rig.shared.setup.rig_file import DEVICE_BLOCK_S, DEVICE_RATE_HZ
-from tactileq.rig.devices.sound.output import SoundOutput, check_masking
-from tactileq.rig.devices.sound.played import STALLED_S
-from tactileq.rig.devices.sound.supervision import HALTED, SoundLost
-from tactileq.rig.devices.sound.vibration import Counted, Presented, VibrationOutput
 
 _POLL_S = 0.001
 Answer = TypeVar("Answer")

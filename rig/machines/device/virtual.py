@@ -1,4 +1,4 @@
-"""The firmware on a simulated board in this process: in virtual time, as a transport."""
+"""The device's firmware, compiled for a simulated board in this process."""
 
 from __future__ import annotations
 
@@ -10,9 +10,6 @@ try:
     import tactileq.rig.machines.device._device as _device
 except ImportError:  # no compiler at installation
     _device = None
-
-TICK_HZ = 5000
-_MOST = 4096
 
 
 def compiled_device() -> Any:
@@ -29,89 +26,3 @@ def compiled_device() -> Any:
             "install a C compiler (gcc or clang), then tactileq again."
         )
     return _device
-
-
-class VirtualBoard:
-    """A simulated board, switched on.
-
-    Parameters
-    ----------
-    entropy : int
-        Another one for another start, 0 … 2³² − 1.
-    baud : int
-        Of its port; 0 for any.
-    module : module
-        The compiled firmware; without it that of the cable device.
-    """
-
-    def __init__(self, *, entropy: int = 1, baud: int = 0, module: Any = None) -> None:
-        module = compiled_device() if module is None else module
-        self.ffi, self.lib = module.ffi, module.lib
-        self._memory = self.ffi.new("char[]", self.lib.tq_virtual_size())
-        self.address = self.ffi.cast("tq_virtual *", self._memory)
-        self.lib.tq_virtual_start(self.address, entropy, baud)
-
-    def run(self, port: int, end: int, other: int = -1) -> int:
-        """Let it run in real time, talking through a descriptor that does not block (-1: none).
-
-        Returns
-        -------
-        int
-            0 or 1 once `end` or `other` can be read or is closed, −1 once the port is gone.
-        """
-        return int(self.lib.tq_virtual_run(self.address, port, end, other))
-
-    def given(self, output: int) -> float:
-        """What a motor or the vibrator's converter was told last."""
-        return float(self.lib.tq_virtual_given(self.address, output))
-
-    def shut(self) -> None:
-        """Every output off."""
-        self.lib.tq_virtual_shut(self.address)
-
-
-class VirtualTransport:
-    """A simulated board in virtual time: each read lets it tick until something comes.
-
-    Parameters
-    ----------
-    board : VirtualBoard, optional
-    """
-
-    name = "virtual device"
-
-    def __init__(self, board: VirtualBoard | None = None) -> None:
-        self.board = board or VirtualBoard()
-        self._buffer = self.board.ffi.new("uint8_t[]", _MOST)
-        self.ticks = 0
-        self._held = bytearray()
-
-    def now_s(self) -> float:
-        """Virtual time since it was switched on."""
-        return self.ticks / TICK_HZ
-
-    def read(self, within_s: float) -> bytes:
-        """See `Transport`; the device ticks once at least."""
-        for _ in range(max(1, round(within_s * TICK_HZ))):
-            self.step(1)
-            if self._held:
-                break
-        data, self._held = bytes(self._held), bytearray()
-        return data
-
-    def step(self, ticks: int) -> None:
-        """Let the device tick."""
-        self.board.lib.tq_virtual_step(self.board.address, ticks)
-        self.ticks += ticks
-        count = self.board.lib.tq_virtual_take(self.board.address, self._buffer, _MOST)
-        self._held += bytes(self.board.ffi.buffer(self._buffer, count))
-
-    def write(self, data: bytes) -> None:
-        """See `Transport`."""
-        self.board.lib.tq_virtual_receive(self.board.address, data, len(data))
-
-    def wake(self) -> None:
-        """Nothing waits here."""
-
-    def close(self) -> None:
-        """Nothing to give back."""

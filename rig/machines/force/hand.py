@@ -6,14 +6,14 @@ import threading
 from contextlib import suppress
 
 from tactileq.modeling.errors import InputError
+from tactileq.rig.devices.hand.messages import Ready
+from tactileq.rig.devices.hand.reader import SILENT_S, START_S, HandReader
+from tactileq.rig.devices.hand.settings import HandSettings
 from tactileq.rig.machines.force.control import Control
 from tactileq.rig.machines.force.messages import Acted, RunServo, Servo, Watch
 from tactileq.rig.machines.force.settings import UNWATCHED_S, ForceSettings
 from tactileq.rig.machines.force.states import Ask, Cause, State, Status
 from tactileq.rig.machines.force.wall import Wall
-from tactileq.rig.devices.hand.messages import Ready
-from tactileq.rig.devices.hand.reader import SILENT_S, START_S, HandReader
-from tactileq.rig.devices.hand.settings import HandSettings
 from tactileq.rig.shared.live.child import Child, ChildLost
 from tactileq.rig.shared.live.clock import check_clock, now_s, sleep
 from tactileq.rig.shared.live.memory import Live
@@ -163,7 +163,8 @@ class ForceHand(HandReader):
 
     def _start_watchdog(self) -> None:
         self._watchdog = dog = Child(
-            "tactileq.rig.machines.force.watchdog", Watch(live=str(self._live.path), settings=self._force)
+            "tactileq.rig.machines.force.watchdog",
+            Watch(live=str(self._live.path), settings=self._force),
         )
         try:
             dog.ready(Ready, within_s=START_S)

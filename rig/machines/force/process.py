@@ -1,8 +1,8 @@
 """The servo's process, driven by `tactileq.rig.machines.force.messages`.
 
-Python opens the device and hands it to `tq_servo_run` (rig/machines/force/servo.h), which keeps this thread
-until it is asked to stop. Where the parent is gone, the force ramps to 0 and the process ends
-(docs/force-device.md#processes).
+Python opens the device and hands it to `tq_servo_run` (rig/machines/force/servo.h), which keeps
+this thread until it is asked to stop. Where the parent is gone, the force ramps to 0 and the
+process ends (docs/force-device.md#processes).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from math import nan
 from typing import Any
 
 from tactileq.modeling.errors import InputError
+from tactileq.rig.devices.hand.messages import Ready
 from tactileq.rig.machines.force.dhd import DhdLibrary
 from tactileq.rig.machines.force.realtime import SERVO_PRIORITY, real_time
 from tactileq.rig.machines.force.serving import ServedServo, serve_servo
@@ -23,7 +24,6 @@ from tactileq.rig.machines.force.settings import (
     VELOCITY_HZ,
     ForceSettings,
 )
-from tactileq.rig.devices.hand.messages import Ready
 from tactileq.rig.shared.live.clock import now_s
 from tactileq.rig.shared.live.compiled import compiled
 from tactileq.rig.shared.live.driven import Parent

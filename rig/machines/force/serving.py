@@ -8,12 +8,12 @@ from contextlib import suppress
 from typing import Any
 
 from tactileq.modeling.errors import InputError
+from tactileq.rig.devices.hand.messages import HandFault
 from tactileq.rig.machines.force.control import Control
 from tactileq.rig.machines.force.messages import RunServo
 from tactileq.rig.machines.force.realtime import outlive_signals
 from tactileq.rig.machines.force.settings import ForceSettings
 from tactileq.rig.machines.force.states import Ask
-from tactileq.rig.devices.hand.messages import HandFault
 from tactileq.rig.shared.live.clock import now_s, wait_for
 from tactileq.rig.shared.live.driven import Parent
 from tactileq.rig.shared.live.memory import Live

@@ -13,13 +13,13 @@ import threading
 from contextlib import suppress
 
 from tactileq.modeling.errors import InputError
+from tactileq.rig.devices.hand.messages import Ready
 from tactileq.rig.machines.force.control import Control
 from tactileq.rig.machines.force.dhd import DhdLibrary
 from tactileq.rig.machines.force.messages import Acted, Servo, Watch
 from tactileq.rig.machines.force.realtime import WATCHDOG_PRIORITY, outlive_signals, real_time
 from tactileq.rig.machines.force.settings import MISSED_S, ForceSettings
 from tactileq.rig.machines.force.states import State
-from tactileq.rig.devices.hand.messages import Ready
 from tactileq.rig.shared.live.clock import now_s, sleep, taking_part
 from tactileq.rig.shared.live.driven import Parent
 from tactileq.rig.shared.live.memory import Live

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from tactileq.modeling.errors import InputError
-from tactileq.rig.machines.device.virtual import TICK_HZ, VirtualBoard, VirtualTransport
-from tactileq.rig.shared.live.clock import sleep
+from tactileq.rig.machines.board.virtual import TICK_HZ, VirtualBoard, VirtualTransport
 from tactileq.rig.machines.recorder.definition import RECORDER
 from tactileq.rig.machines.recorder.law import RecorderLaw, WantedRecord
 from tactileq.rig.machines.recorder.registers import (
@@ -20,6 +19,7 @@ from tactileq.rig.machines.recorder.registers import (
 )
 from tactileq.rig.machines.recorder.sensors import Sensor
 from tactileq.rig.machines.recorder.virtual import compiled_recorder
+from tactileq.rig.shared.live.clock import sleep
 from tactileq.rig.shared.wire.conversation import Conversation, DeviceRefused
 from tactileq.rig.shared.wire.definition import Value
 from tactileq.rig.shared.wire.link import Link
@@ -52,7 +52,7 @@ class VirtualWire:
     """
 
     def __init__(self, *, entropy: int = 1) -> None:
-        self.transport = VirtualTransport(VirtualBoard(entropy=entropy, module=compiled_recorder()))
+        self.transport = VirtualTransport(VirtualBoard(compiled_recorder(), entropy=entropy))
         self._talk = Conversation(self.transport, RECORDER)
         self._talk.hello()
 

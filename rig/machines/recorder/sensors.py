@@ -15,8 +15,8 @@ import numpy as np
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import InputError
 from tactileq.modeling.models.grid import Condition
-from tactileq.rig.recording.capture.input import AudioInput, InputBlock
 from tactileq.rig.machines.recorder.evaluation import Axis, read_evaluation
+from tactileq.rig.recording.capture.input import AudioInput, InputBlock
 
 SETTLED_S = 0.5  # a file that has not changed for so long may be whole
 MARGIN_S = 5.0  # that the recorder holds longer than a sound card should need

@@ -22,6 +22,7 @@ from tactileq.modeling.files.writing import write_text
 from tactileq.modeling.models.grid import Condition
 from tactileq.modeling.recordings.appending import append
 from tactileq.modeling.recordings.recording_set import INDEX_COLUMNS, INDEX_NAME, listed, stated
+from tactileq.rig.machines.recorder.driver import DriverRecord
 from tactileq.rig.recording.capture.pieces import Plan
 from tactileq.rig.recording.capture.recorded import (
     begin_index,
@@ -29,7 +30,6 @@ from tactileq.rig.recording.capture.recorded import (
     recorded_conditions,
     unusable_recordings,
 )
-from tactileq.rig.machines.recorder.driver import DriverRecord
 
 PLAN_NAME = "recorder.json"
 TABLE_NAME = "recorder.tsv"

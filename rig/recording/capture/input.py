@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.checks import check_rate, check_whole, is_positive
 from tactileq.modeling.errors import InputError, shortened, shown
-from tactileq.rig.shared.live.clock import called, now_s
 from tactileq.rig.devices.sound.devices import check_rate as check_device_rate
 from tactileq.rig.devices.sound.devices import find_device, portaudio
+from tactileq.rig.shared.live.clock import called, now_s
 
 BLOCK_S = 0.02
 MOST_CHANNELS = 64
@@ -80,8 +80,8 @@ class InputBlock:
     samples : (n,) ndarray
         Shares of full scale.
     time_s : float
-        When the first sample was measured, by `tactileq.rig.shared.live.clock.now_s`; the input latency is
-        taken off.
+        When the first sample was measured, by `tactileq.rig.shared.live.clock.now_s`; the input
+        latency is taken off.
     lost : bool
         Whether samples are missing between the block before and this one.
     """

@@ -40,7 +40,7 @@ JUDGED_FROM_S = 10.0
 
 
 class AccelerationSource(Protocol):
-    """Where blocks of acceleration come from, such as `tactileq.rig.recording.capture.input.AudioInput`."""
+    """Where blocks of acceleration come from, such as an `AudioInput` (input.py)."""
 
     @property
     def running(self) -> bool:

@@ -60,7 +60,7 @@ def _last_line(complaints: IO[bytes]) -> str:
 
 
 class Child:
-    """A process with a `tactileq.rig.shared.live.driven.Parent` at its other end; it is started at once.
+    """A process with a `Parent` (driven.py) at its other end; it is started at once.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The other end of a `tactileq.rig.shared.live.child.Child`: a process that is driven by messages."""
+"""The other end of a `Child` (child.py): a process that is driven by messages."""
 
 from __future__ import annotations
 

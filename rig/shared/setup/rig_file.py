@@ -53,9 +53,9 @@ class RigFile(DescribedFile):
     Parameters
     ----------
     rig, sound, vibrator, limits, hand, force, device, pose, accelerometer, latency, calibration
-        Its sections (`tactileq.rig.shared.setup.sections`, `tactileq.rig.shared.setup.force_sections`). None
-        where there is no force device or accelerometer, and where pose, latency or calibration have
-        not been measured yet.
+        Its sections (`tactileq.rig.shared.setup.sections`,
+        `tactileq.rig.shared.setup.force_sections`). None where there is no force device or
+        accelerometer, and where pose, latency or calibration have not been measured yet.
     real_surface : RealSurfaceSection
     path : Path
         The file.

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactileq.commands.results.analyze import read_answers
-from tactileq.commands.study.simulate import run_study
-from tactileq.commands.models.stimuli import render_set
 from tactileq.commands.benches.demo_benches import Benches, begun_scenes, reported
 from tactileq.commands.benches.demo_parts import JOBS, demo_population, modelled, presented
+from tactileq.commands.models.stimuli import render_set
+from tactileq.commands.results.analyze import read_answers
+from tactileq.commands.study.simulate import run_study
 from tactileq.options import Out, Seed
 from tactileq.own_results import check_own_results
 from tactileq.printing import progress, share_of

@@ -6,10 +6,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tactileq.commands.results.analyze import read_answers
-from tactileq.commands.study.simulate import run_study
 from tactileq.commands.benches.demo_benches import reported
 from tactileq.commands.benches.demo_parts import JOBS, demo_population, modelled, presented
+from tactileq.commands.results.analyze import read_answers
+from tactileq.commands.study.simulate import run_study
 from tactileq.own_results import check_own_results
 from tactileq.printing import progress, share_of
 from tactileq.workers import mapping

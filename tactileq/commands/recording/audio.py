@@ -18,13 +18,13 @@ from tactileq.modeling.errors import counted
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from tactileq.rig.devices.hand.reader import HandReader
+    from tactileq.rig.devices.hand.settings import HandSettings
     from tactileq.rig.recording.capture.cutting import Readings
     from tactileq.rig.recording.capture.grid import StrokeGrid
     from tactileq.rig.recording.capture.input import InputSettings
     from tactileq.rig.recording.capture.pieces import Plan
     from tactileq.rig.recording.capture.recorder import StrokeRecorder
-    from tactileq.rig.devices.hand.reader import HandReader
-    from tactileq.rig.devices.hand.settings import HandSettings
     from tactileq.rig.shared.live.memory import Live
     from tactileq.rig.shared.setup.rig_file import RigFile
 
@@ -181,10 +181,10 @@ def record_on(
     heard: InputSettings,
 ) -> None:
     """Open the devices, and record until the grid is full."""
+    from tactileq.rig.desk.lock import rig_locked
     from tactileq.rig.recording.capture.input import AudioInput
     from tactileq.rig.recording.capture.pieces import PieceStore, Plan
     from tactileq.rig.recording.capture.recorder import StrokeRecorder
-    from tactileq.rig.desk.lock import rig_locked
 
     alone = nullcontext() if rig is None else rig_locked(rig.rig.name)
     with alone, opened_hand(hand) as (live, reader), AudioInput(heard) as source:

@@ -17,11 +17,11 @@ from tactileq.printing import progress
 if TYPE_CHECKING:
     from tactileq.modeling.arrays import Floats
     from tactileq.modeling.models.grid import Condition
-    from tactileq.rig.recording.capture.grid import StrokeGrid
     from tactileq.rig.machines.recorder.driver import Recorder, RecorderWire, VirtualWire
     from tactileq.rig.machines.recorder.recorder_file import RecorderFile
     from tactileq.rig.machines.recorder.recording import PlanRun
     from tactileq.rig.machines.recorder.sensors import Sensor
+    from tactileq.rig.recording.capture.grid import StrokeGrid
 
 MOST_REFUSED = 3
 
@@ -171,8 +171,12 @@ def _virtual(options: RecorderRecording) -> VirtualWire:
 @contextmanager
 def _sensor(file: RecorderFile, device: Recorder, options: RecorderRecording) -> Iterator[Sensor]:
     """What measures the vibration, open."""
+    from tactileq.rig.machines.recorder.sensors import (
+        DrawnVibration,
+        EvaluationFiles,
+        SoundCardSensor,
+    )
     from tactileq.rig.recording.capture.input import AudioInput, InputSettings
-    from tactileq.rig.machines.recorder.sensors import DrawnVibration, EvaluationFiles, SoundCardSensor
 
     settings = file.sensor
     if file.simulated:
@@ -236,9 +240,9 @@ def _plan_run(
     sensor: Sensor,
 ) -> PlanRun:
     """What is still to be recorded into the folder."""
-    from tactileq.rig.recording.capture.pieces import Plan
     from tactileq.rig.machines.recorder.recording import PlanRun
     from tactileq.rig.machines.recorder.store import RecorderStore
+    from tactileq.rig.recording.capture.pieces import Plan
 
     plan = Plan(
         options.texture,

@@ -44,18 +44,18 @@ def publish(
 
     Example: tactileq publish data --study study.toml --out archive
     """
+    from tactileq.commands.results.analyze import analyze
+    from tactileq.commands.results.publishing import assemble, check_publishable, checked_models
+    from tactileq.commands.results.verification import require_verified
     from tactileq.experiments.publishing.archive import COMMAND, DATA
     from tactileq.experiments.publishing.metadata import Publication
     from tactileq.experiments.sessions.bids.validator import bids_issues, said_of
-    from tactileq.commands.results.analyze import analyze
     from tactileq.experiments.study.study import Study
     from tactileq.modeling import InputError
     from tactileq.modeling.errors import counted
     from tactileq.modeling.files.folders import replace_folder
     from tactileq.modeling.files.hashes import seal_over, sha256_of_paths
     from tactileq.modeling.files.provenance import provenance_of, seal_folder, sha256_of_files
-    from tactileq.commands.results.publishing import assemble, check_publishable, checked_models
-    from tactileq.commands.results.verification import require_verified
 
     seen = check_own_results(out, COMMAND)
     stated = Study.load(study)
@@ -114,9 +114,9 @@ def _places(models: list[str] | None) -> dict[str, Path]:
 
 def _options_of(results: Path, data: Path) -> dict[str, Any]:
     """The options of the analysis of these data."""
+    from tactileq.commands.results.verified_results import require_data
     from tactileq.modeling.files.documents import read_json_object
     from tactileq.modeling.files.provenance import PROVENANCE_NAME
-    from tactileq.commands.results.verified_results import require_data
 
     note = read_json_object(results / PROVENANCE_NAME, advice="name a folder of results")
     require_data(note, data, results)

@@ -16,7 +16,15 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactileq.experiments.publishing.archive import DATA, PSYCH_DS, RECORDINGS, REPORT, REPORTED, SETS_OF_MODELS, STIMULI
+from tactileq.experiments.publishing.archive import (
+    DATA,
+    PSYCH_DS,
+    RECORDINGS,
+    REPORT,
+    REPORTED,
+    SETS_OF_MODELS,
+    STIMULI,
+)
 from tactileq.experiments.publishing.metadata import Publication, bids_description, write_metadata
 
 if TYPE_CHECKING:
@@ -80,9 +88,9 @@ def checked_models(
     InputError
         For models that are not those that were presented, and for a set of another name.
     """
+    from tactileq.commands.results.verification import differing_models
     from tactileq.modeling import InputError
     from tactileq.modeling.checks import check_keys
-    from tactileq.commands.results.verification import differing_models
 
     names = tuple(dict.fromkeys(name for one in manifests for name in one.study["models"]))
     check_keys(given, names, where="the sets of models of the study")

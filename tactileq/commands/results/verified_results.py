@@ -37,8 +37,8 @@ def verify_models(manifests: Sequence[SessionManifest]) -> tuple[list[str], str]
     InputError
         If a file of models is none.
     """
-    from tactileq.modeling.errors import counted
     from tactileq.commands.results.verification import differing_models
+    from tactileq.modeling.errors import counted
 
     of_place: dict[tuple[str, Path], list[SessionManifest]] = {}
     for one in manifests:

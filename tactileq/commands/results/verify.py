@@ -27,11 +27,15 @@ def verify(
 
     Example: tactileq verify data analysis-results
     """
-    from tactileq.experiments.publishing.archive import DATA, REPORT, is_archive
     from tactileq.commands.results.analyze import analyze
-    from tactileq.experiments.verification.verifying import verify_data
     from tactileq.commands.results.verification import print_data_differences, print_differences
-    from tactileq.commands.results.verified_results import verify_archive, verify_models, verify_results
+    from tactileq.commands.results.verified_results import (
+        verify_archive,
+        verify_models,
+        verify_results,
+    )
+    from tactileq.experiments.publishing.archive import DATA, REPORT, is_archive
+    from tactileq.experiments.verification.verifying import verify_data
 
     checks = []
     if is_archive(data):

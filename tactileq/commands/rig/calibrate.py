@@ -15,8 +15,8 @@ from tactileq.options import RigPath, Seed
 
 if TYPE_CHECKING:
     from tactileq.rig.desk.calibration.measuring import Accelerometer
-    from tactileq.rig.shared.setup.rig_file import RigFile
     from tactileq.rig.devices.sound.vibration import VibrationOutput
+    from tactileq.rig.shared.setup.rig_file import RigFile
 
 What = Literal["floor", "vibrator", "level", "pressure"]
 
@@ -146,7 +146,11 @@ def _level(
 
 def _pressure(rig: RigFile) -> None:
     from tactileq.rig.desk.calibration.opening import pressure_reader
-    from tactileq.rig.desk.calibration.steps import STANDARD_GRAVITY, mean_pressure, pressure_figures
+    from tactileq.rig.desk.calibration.steps import (
+        STANDARD_GRAVITY,
+        mean_pressure,
+        pressure_figures,
+    )
     from tactileq.rig.devices.hand.pressure import FEWEST_WEIGHTS, fit_pressure
     from tactileq.rig.shared.live.memory import Live
 

@@ -31,7 +31,13 @@ def rig_check(rig: RigPath = Path("rig.toml")) -> None:
 
     from rich.console import Console
 
-    from tactileq.rig.desk.inventory import connected_input, connected_sound, of_rig, remedies, versions
+    from tactileq.rig.desk.inventory import (
+        connected_input,
+        connected_sound,
+        of_rig,
+        remedies,
+        versions,
+    )
 
     console = Console()
     loaded, of_file = of_rig(rig, today=datetime.date.today())

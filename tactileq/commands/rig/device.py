@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from tactileq.interruption import Interrupted
+
+if TYPE_CHECKING:
+    from tactileq.rig.machines.board.emulating import Machine
 
 Kind = Literal["process", "m7", "stm32"]
 # Which board, and whether it is a recorder.
@@ -75,11 +78,18 @@ def rig_device(
         _write_firmware(kind, firmware, baud, recorder=recorder)
 
 
+def _machine(recorder: bool) -> Machine:
+    from tactileq.rig.machines.device.machine import CABLE_DEVICE
+    from tactileq.rig.machines.recorder.machine import SURFACE_RECORDER
+
+    return SURFACE_RECORDER if recorder else CABLE_DEVICE
+
+
 def _emulate(kind: Kind, baud: int | None, port: int, *, recorder: bool) -> None:
     from tactileq.rig.machines.board.emulating import Emulator
 
     what = "recorder" if recorder else "device"
-    with Emulator(kind, baud=baud, port=port, recorder=recorder) as emulator:
+    with Emulator(kind, _machine(recorder), baud=baud, port=port) as emulator:
         print(
             f"emulated {what} ({kind}, simulated) at {emulator.address}; Ctrl-C ends it",
             flush=True,
@@ -101,7 +111,7 @@ def _write_firmware(kind: Kind, file: Path, baud: int | None, *, recorder: bool)
     rate = baud or USUAL_BAUD[kind]
     check_baud(kind, rate)
     simulated = kind == "m7"
-    build_firmware(kind, file, baud=rate, simulated=simulated, recorder=recorder)
+    build_firmware(kind, _machine(recorder), file, baud=rate, simulated=simulated)
     moves = "simulated mechanics" if recorder else "a simulated hand"
     name = f"a recorder on {kind}" if recorder else kind
     print(

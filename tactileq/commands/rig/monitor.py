@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from tactileq.modeling.rendering.plan import RenderCounters
     from tactileq.rig.devices.monitoring.bare_thread import WakeUps
     from tactileq.rig.devices.monitoring.figures import Range, Snapshot
-    from tactileq.rig.shared.setup.rig_file import RigFile
     from tactileq.rig.devices.sound.vibration import VibrationOutput
+    from tactileq.rig.shared.setup.rig_file import RigFile
 
 _EVERY_S = 0.1
 
@@ -58,11 +58,11 @@ def _watch(rig: RigFile, model: AnyModel | None, seconds: float | None) -> None:
 
     from tactileq.rig.desk.calibration.opening import opened_sound
     from tactileq.rig.desk.parts import hand_reader
+    from tactileq.rig.devices.monitoring.bare_thread import Look, WakeUps
+    from tactileq.rig.devices.monitoring.figures import Monitor
     from tactileq.rig.shared.live.child import Child
     from tactileq.rig.shared.live.memory import Live
     from tactileq.rig.shared.live.messages import Done
-    from tactileq.rig.devices.monitoring.bare_thread import Look, WakeUps
-    from tactileq.rig.devices.monitoring.figures import Monitor
 
     rate_hz, period_s = rig.output_rate_hz, rig.output_block_s
     with (

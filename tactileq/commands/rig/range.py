@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactileq.commands.recording.audio import HandOptions, hand_from, opened_hand, rig_from, since_now
+from tactileq.commands.recording.audio import (
+    HandOptions,
+    hand_from,
+    opened_hand,
+    rig_from,
+    since_now,
+)
 from tactileq.modeling.errors import counted
 from tactileq.options import AssumedForce, CountsPerMm, HandDevice, HandKind, OptionalRigPath, Out
 from tactileq.own_results import note_of_file, write_own_files
@@ -17,10 +23,10 @@ from tactileq.printing import share_of
 
 if TYPE_CHECKING:
     from tactileq.modeling.arrays import Floats
+    from tactileq.rig.devices.hand.settings import HandSettings
     from tactileq.rig.recording.capture.cutting import Readings
     from tactileq.rig.recording.capture.exploration import Exploration
     from tactileq.rig.recording.capture.grid import StrokeGrid
-    from tactileq.rig.devices.hand.settings import HandSettings
 
 STEP_S = 0.1
 LONGEST_S = 600.0

@@ -57,9 +57,9 @@ def rig_twin(
 def _write_rig_file(path: Path, card: SimulatedCard) -> None:
     """The shipped rig file with this card and a scripted hand."""
     from tactileq.modeling.files.writing import write_text
+    from tactileq.rig.devices.sound.devices import find_device
     from tactileq.rig.shared.setup.figures import Figure
     from tactileq.rig.shared.setup.rig_file import SHIPPED_RIG_FILE, RigFile
-    from tactileq.rig.devices.sound.devices import find_device
 
     rate_hz = find_device(card.name, "output").rate_hz
     scale = Figure(card.vibrator.sensor_fullscale_g, "g", True, "of the simulated accelerometer")

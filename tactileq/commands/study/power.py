@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tactileq.commands.study.power_in_memory import chances, people_of, planned_for
 from tactileq.commands.study.session import models_of_study
 from tactileq.modeling.errors import shown
 from tactileq.options import (
@@ -20,7 +21,6 @@ from tactileq.options import (
     ThresholdName,
 )
 from tactileq.own_results import check_own_results
-from tactileq.commands.study.power_in_memory import chances, people_of, planned_for
 from tactileq.printing import print_models, progress
 
 if TYPE_CHECKING:

@@ -156,9 +156,9 @@ def rig_of(plan: Study, sets: ModelSets, *, rig: Path | None, override: str | No
     """
     from tactileq.rig.desk.checks import Requirements, check_models
     from tactileq.rig.desk.desk_rig import DeskRig
+    from tactileq.rig.desk.twin import SimulatedRig
     from tactileq.rig.shared.interface import Stimulus
     from tactileq.rig.shared.setup.rig_file import RigFile
-    from tactileq.rig.desk.twin import SimulatedRig
 
     every = [sets.of(texture, name) for name in sets.names for texture in plan.textures]
     if rig is None:

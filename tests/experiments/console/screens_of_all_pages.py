@@ -29,8 +29,8 @@ from tactileq.experiments.tasks.absolute import AbsoluteTrial
 from tactileq.experiments.tasks.oddity import OddityTrial
 from tactileq.experiments.tasks.relative import RelativeTrial
 from tactileq.experiments.tasks.threshold import ThresholdTrial
-from tactileq.rig.shared.interface import ToneBurst
 from tactileq.rig.desk.twin import SimulatedRig
+from tactileq.rig.shared.interface import ToneBurst
 from tactileq.stimuli.planted.textures import planted_texture
 
 drawn = []

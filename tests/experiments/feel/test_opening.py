@@ -16,12 +16,12 @@ from tactileq.experiments.feel import opening
 from tactileq.experiments.feel.live_rig import LiveRig
 from tactileq.experiments.feel.opening import NO_SOUND, demonstration, desk
 from tactileq.modeling import InputError, TextureModel, compensation_for
+from tactileq.rig.devices.sound.devices import SoundDevice
+from tactileq.rig.devices.sound.supervision import SoundLost
 from tactileq.rig.machines.force.standin import StandIn
 from tactileq.rig.shared.live.clock import now_s, sleep
 from tactileq.rig.shared.live.memory import CONTACT, FORCE_ASSUMED, GONE, HEARTBEAT_S, Live
 from tactileq.rig.shared.setup.rig_file import SHIPPED_RIG_FILE
-from tactileq.rig.devices.sound.devices import SoundDevice
-from tactileq.rig.devices.sound.supervision import SoundLost
 from tactileq.stimuli.planted.textures import planted_texture
 from tactileq.stimuli.planted.vibrators import planted_vibrator
 from tests.refusals import refused

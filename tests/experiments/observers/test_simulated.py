@@ -30,8 +30,8 @@ from tactileq.experiments.tasks.threshold import ThresholdTrial
 from tactileq.modeling import InputError, TextureModel, Threshold
 from tactileq.modeling.participants.choices import oddity_share
 from tactileq.modeling.participants.ratings import AT_END
-from tactileq.rig.shared.interface import ToneBurst
 from tactileq.rig.desk.twin import SimulatedRig
+from tactileq.rig.shared.interface import ToneBurst
 from tests.refusals import refused
 
 EXACT = Psychometrics(

@@ -13,8 +13,8 @@ import pytest
 from tactileq.experiments.publishing.presented import render_presentation
 from tactileq.experiments.publishing.redacting import LEFT_OUT, redact
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
-from tactileq.experiments.sessions.store.session_store import SessionStore
 from tactileq.experiments.sessions.kept.stored_sessions import held_sessions
+from tactileq.experiments.sessions.store.session_store import SessionStore
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.verification.verifying import verify_data
 from tactileq.modeling import InputError

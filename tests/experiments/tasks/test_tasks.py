@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from tactileq.experiments.sessions.store.interface import MemoryStore
 from tactileq.experiments.sessions.loop.trial_loop import People, run_trials
+from tactileq.experiments.sessions.store.interface import MemoryStore
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.study import Study
 from tactileq.experiments.study.task_plan import TaskPlan

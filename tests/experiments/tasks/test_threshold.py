@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from tactileq.experiments.sessions.loop.agenda import Agenda
-from tactileq.experiments.sessions.store.interface import MemoryStore
 from tactileq.experiments.sessions.loop.trial_loop import People, SessionResult, run_trials
+from tactileq.experiments.sessions.store.interface import MemoryStore
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.study import Study
 from tactileq.experiments.study.task_plan import TaskPlan
@@ -25,8 +25,8 @@ from tactileq.experiments.tasks.threshold import (
 from tactileq.experiments.tasks.threshold_posterior import LEVELS_DB, answers_of, estimate
 from tactileq.modeling import InputError
 from tactileq.modeling.files.answer_tables import ANSWER_TABLES
-from tactileq.rig.shared.interface import ToneBurst
 from tactileq.rig.desk.twin import SimulatedRig
+from tactileq.rig.shared.interface import ToneBurst
 from tests.experiments.scripted import Ready
 from tests.experiments.tasks.planted_threshold import Feeling
 from tests.refusals import refused

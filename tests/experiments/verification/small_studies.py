@@ -17,12 +17,12 @@ import numpy as np
 import pytest
 
 from tactileq.experiments.observers.experimenter import SimulatedExperimenter
-from tactileq.experiments.sessions.kept import log
 from tactileq.experiments.sessions.bids.export import export_all, export_session
+from tactileq.experiments.sessions.kept import log
 from tactileq.experiments.sessions.kept.files import SessionFiles
+from tactileq.experiments.sessions.kept.stored_sessions import held_session
 from tactileq.experiments.sessions.loop.people import Choice, Intake, Rating, SessionAborted
 from tactileq.experiments.sessions.loop.running import Circumstances, run_session
-from tactileq.experiments.sessions.kept.stored_sessions import held_session
 from tactileq.experiments.sessions.loop.surfaces import Surfaces
 from tactileq.experiments.sessions.loop.trial_loop import People, SessionResult
 from tactileq.experiments.sessions.store.withdrawing import drop_out, withdraw

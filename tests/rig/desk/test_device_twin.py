@@ -10,8 +10,8 @@ import pytest
 
 from tactileq.modeling import InputError, Renderer
 from tactileq.modeling.hand import Hand
-from tactileq.rig.machines.device.registers import DeviceSimulation
 from tactileq.rig.desk.device_twin import LOOK_S, WALL, DeviceTwin
+from tactileq.rig.machines.device.registers import DeviceSimulation
 from tactileq.rig.shared.interface import SURFACES, HandRows, ToneBurst
 from tactileq.stimuli.planted.textures import planted_texture
 from tests.refusals import refused

@@ -11,7 +11,6 @@ import pytest
 
 from tactileq.modeling import InputError
 from tactileq.rig.desk import inventory
-from tactileq.rig.devices.hand.sample import ConnectedDevice
 from tactileq.rig.desk.inventory import (
     Finding,
     connected_input,
@@ -20,6 +19,7 @@ from tactileq.rig.desk.inventory import (
     remedies,
     versions,
 )
+from tactileq.rig.devices.hand.sample import ConnectedDevice
 from tactileq.rig.devices.sound.devices import NoPortAudio, SoundDevice
 from tests.refusals import check_refusal
 from tests.rig.desk.rig_files import rig_file, rig_text

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tactileq.rig.recording.capture.input import InputBlock
 from tactileq.rig.desk.desk_rig import DeskRig
 from tactileq.rig.desk.pen_process import PenLog
-from tactileq.rig.shared.live.clock import sleep
 from tactileq.rig.devices.simulated.card import DEVICE, SimulatedCard
 from tactileq.rig.devices.simulated.vibrator import SimulatedTransducers
+from tactileq.rig.recording.capture.input import InputBlock
+from tactileq.rig.shared.live.clock import sleep
 from tactileq.stimuli.planted.textures import planted_texture
 from tests.rig.desk.rig_files import rig_file
 from tests.rig.waiting import follow

@@ -9,9 +9,9 @@ import pytest
 
 from tactileq.modeling import InputError, Renderer, regressed
 from tactileq.modeling.models.loading import Layered
-from tactileq.rig.shared.interface import SURFACES, RigReading, TextureRig, ToneBurst
-from tactileq.rig.devices.sound.signals import tone_burst
 from tactileq.rig.desk.twin import SimulatedRig
+from tactileq.rig.devices.sound.signals import tone_burst
+from tactileq.rig.shared.interface import SURFACES, RigReading, TextureRig, ToneBurst
 from tests.refusals import refused
 from tests.rig.planted import planted_model as model
 from tests.rig.planted import planted_stimulus

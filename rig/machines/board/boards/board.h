@@ -5,11 +5,7 @@
 #ifndef TQ_BOARD_H
 #define TQ_BOARD_H
 
-#ifdef TQ_RECORDER
-#include "../../recorder/simulated.h"
-#else
-#include "simulated.h"
-#endif
+#include "simulated.h" /* of the machine, by the compiler's folders: it includes all else */
 
 /* --- To be written ------------------------------------------------------------------------------- */
 

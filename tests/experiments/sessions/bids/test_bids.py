@@ -17,8 +17,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactileq.experiments.sessions.bids.validator import bids_issues
 from tactileq.experiments.observers.whole_study import simulate_study
+from tactileq.experiments.sessions.bids.events import onsets_s
 from tactileq.experiments.sessions.bids.export import (
     Exported,
     differing_tables,
@@ -26,14 +26,14 @@ from tactileq.experiments.sessions.bids.export import (
     export_session,
     require_tables,
 )
-from tactileq.experiments.sessions.bids.events import onsets_s
 from tactileq.experiments.sessions.bids.physio import RATE_HZ, at_regular_times
 from tactileq.experiments.sessions.bids.tables import cell, table_bytes
+from tactileq.experiments.sessions.bids.validator import bids_issues
 from tactileq.experiments.sessions.kept.files import SessionFiles
 from tactileq.experiments.sessions.kept.log import Log, read_log
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
-from tactileq.experiments.sessions.store.session_store import SessionStore
 from tactileq.experiments.sessions.kept.stored_sessions import held_sessions
+from tactileq.experiments.sessions.store.session_store import SessionStore
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.study import Study
 from tactileq.experiments.study.task_plan import TaskPlan

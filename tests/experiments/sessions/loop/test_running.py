@@ -14,19 +14,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tactileq.experiments.sessions.kept import program
 from tactileq.experiments.sessions.bids.export import export_all, export_session
+from tactileq.experiments.sessions.kept import program
 from tactileq.experiments.sessions.kept.log import read_log
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
-from tactileq.experiments.sessions.loop.people import Intake, Rating, SessionAborted
 from tactileq.experiments.sessions.kept.roster import Roster
-from tactileq.experiments.sessions.loop.running import Circumstances, run_session
-from tactileq.experiments.sessions.store.session_store import SessionStore
 from tactileq.experiments.sessions.kept.state import session_state
-from tactileq.experiments.sessions.store.status import study_progress
+from tactileq.experiments.sessions.kept.writer import StoreError
+from tactileq.experiments.sessions.loop.people import Intake, Rating, SessionAborted
+from tactileq.experiments.sessions.loop.running import Circumstances, run_session
 from tactileq.experiments.sessions.loop.surfaces import Surfaces
 from tactileq.experiments.sessions.loop.trial_loop import People, SessionResult
-from tactileq.experiments.sessions.kept.writer import StoreError
+from tactileq.experiments.sessions.store.session_store import SessionStore
+from tactileq.experiments.sessions.store.status import study_progress
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.questions import Question
 from tactileq.experiments.study.study import Consent, Study

@@ -10,19 +10,25 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tactileq.experiments.sessions.kept.writer import StoreError
 from tactileq.experiments.sessions.loop.agenda import Agenda
 from tactileq.experiments.sessions.loop.people import Intake, Rating, SessionAborted
-from tactileq.experiments.sessions.store.interface import MemoryStore
 from tactileq.experiments.sessions.loop.surfaces import Surfaces
 from tactileq.experiments.sessions.loop.trial_loop import People, SessionResult, run_trials
-from tactileq.experiments.sessions.kept.writer import StoreError
+from tactileq.experiments.sessions.store.interface import MemoryStore
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.study import Study
 from tactileq.experiments.study.task_plan import TaskPlan
 from tactileq.experiments.tasks import plan_session, task_named
 from tactileq.modeling import InputError
-from tactileq.rig.shared.interface import Acceleration, Fault, HandRows, PresentationRecord, ToneBurst
 from tactileq.rig.desk.twin import SimulatedRig
+from tactileq.rig.shared.interface import (
+    Acceleration,
+    Fault,
+    HandRows,
+    PresentationRecord,
+    ToneBurst,
+)
 from tests.experiments.scripted import Ready, Scripted
 from tests.refusals import refused
 
@@ -342,7 +348,9 @@ def test_a_response_begins_with_the_first_sample_on_whatever_clock_the_rig_has(
     models: ModelSets, rig: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     host = [100.0]
-    monkeypatch.setattr("tactileq.experiments.sessions.loop.surfaces.time.perf_counter", lambda: host[0])
+    monkeypatch.setattr(
+        "tactileq.experiments.sessions.loop.surfaces.time.perf_counter", lambda: host[0]
+    )
     rig.now_s = lambda: 7.0
     rig.present_real = lambda texture: 6.75  # the first sample left 0.25 s ago
     surfaces = surfaces_of(rig, [models.of("PVC", "full")])

@@ -19,18 +19,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactileq.experiments.sessions.store import admission
 from tactileq.experiments.sessions.kept import log
 from tactileq.experiments.sessions.kept.data_set import DESCRIPTION_NAME
 from tactileq.experiments.sessions.kept.files import SessionFiles, sessions_in
 from tactileq.experiments.sessions.kept.log import line_of, read_log
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
 from tactileq.experiments.sessions.kept.overrides import Overrides
-from tactileq.experiments.sessions.store.session_store import SessionStore
 from tactileq.experiments.sessions.kept.state import session_state
-from tactileq.experiments.sessions.store.interface import MemoryStore, Store
 from tactileq.experiments.sessions.kept.tables import GrowingTable, cell
 from tactileq.experiments.sessions.kept.writer import StoreError
+from tactileq.experiments.sessions.store import admission
+from tactileq.experiments.sessions.store.interface import MemoryStore, Store
+from tactileq.experiments.sessions.store.session_store import SessionStore
 from tactileq.modeling import InputError
 from tactileq.modeling.files.columns import Column
 from tactileq.modeling.files.reading import reason_of

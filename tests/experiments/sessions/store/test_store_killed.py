@@ -18,8 +18,8 @@ from tactileq.experiments.sessions.kept.log import line_of, read_log
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
 from tactileq.experiments.sessions.kept.resume import Resumption, resumption
 from tactileq.experiments.sessions.kept.roster import Roster
-from tactileq.experiments.sessions.store.session_store import SessionStore
 from tactileq.experiments.sessions.kept.state import session_state
+from tactileq.experiments.sessions.store.session_store import SessionStore
 from tests.experiments.sessions.store.enrolling import enrolled
 
 ManifestOf = Callable[..., SessionManifest]

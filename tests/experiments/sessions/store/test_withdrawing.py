@@ -13,10 +13,10 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from tactileq.experiments.sessions.store import withdrawing
 from tactileq.experiments.sessions.bids.export import Exported, export_all
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
 from tactileq.experiments.sessions.kept.roster import Roster
+from tactileq.experiments.sessions.store import withdrawing
 from tactileq.experiments.sessions.store.session_store import SessionStore
 from tactileq.experiments.sessions.store.withdrawing import drop_out, files_of, withdraw
 from tactileq.modeling import InputError

@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike
 
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.vibrators.compensation import compensation_for
-from tactileq.rig.recording.capture.input import AudioInput, InputBlock, InputSettings
-from tactileq.rig.shared.setup.rig_file import RigFile
 from tactileq.rig.devices.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
 from tactileq.rig.devices.sound.output import Presented
+from tactileq.rig.recording.capture.input import AudioInput, InputBlock, InputSettings
+from tactileq.rig.shared.setup.rig_file import RigFile
 
 RATE_HZ = 8000.0
 RIG = """version = 1

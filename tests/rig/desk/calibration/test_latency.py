@@ -14,8 +14,8 @@ from tactileq.rig.desk.calibration.latency import (
     stroke_lag_s,
     summary_of,
 )
-from tactileq.rig.shared.live.memory import BLOCK
 from tactileq.rig.devices.simulated.vibrator import SimulatedAccelerometer, SimulatedTransducers
+from tactileq.rig.shared.live.memory import BLOCK
 from tests.refusals import refused
 
 RATE_HZ = 48_000.0

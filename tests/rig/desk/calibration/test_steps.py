@@ -28,9 +28,9 @@ from tactileq.rig.desk.calibration.steps import (
 )
 from tactileq.rig.desk.calibration.trials import checked_loop_back_s, loop_back_s
 from tactileq.rig.devices.hand.pressure import fit_pressure
+from tactileq.rig.devices.simulated.vibrator import SimulatedTransducers
 from tactileq.rig.shared.live.memory import Live
 from tactileq.rig.shared.setup.rig_file import RigFile
-from tactileq.rig.devices.simulated.vibrator import SimulatedTransducers
 from tests.refusals import refused
 from tests.rig.desk.calibration.card import RATE_HZ, CalculatedCard, rig_file
 

@@ -22,9 +22,9 @@ from tactileq.rig.devices.hand.sample import Sample
 from tactileq.rig.devices.hand.scripted import SCRIPT_COLUMNS
 from tactileq.rig.devices.hand.settings import HandSettings
 from tactileq.rig.devices.hand.window import PointerDevice
+from tactileq.rig.devices.sound.messages import Silence
 from tactileq.rig.shared.live.clock import now_s, sleep
 from tactileq.rig.shared.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, SIMULATED, Live
-from tactileq.rig.devices.sound.messages import Silence
 from tests.refusals import refused
 from tests.rig.waiting import follow, is_gone, wait_until
 
@@ -175,7 +175,9 @@ def test_who_watches_does_not_kill_for_time_in_which_it_was_held_up_itself(
     reader._child = Process()  # type: ignore[assignment]
     reader._alive_s = 0.0
     monkeypatch.setattr("tactileq.rig.devices.hand.reader.now_s", lambda: now[0])
-    monkeypatch.setattr("tactileq.rig.devices.hand.reader.wait_for", lambda wait, seconds: wait(seconds))
+    monkeypatch.setattr(
+        "tactileq.rig.devices.hand.reader.wait_for", lambda wait, seconds: wait(seconds)
+    )
     reader._watch()
     assert killed_s == [31.1]  # no reading for over a second in which it looked
 

@@ -8,7 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactileq.modeling.arrays import Floats
-from tactileq.rig.devices.hand.tracking import NEW_STROKE_S, REST_S, TrackingFilter, noise_gain_per_s
+from tactileq.rig.devices.hand.tracking import (
+    NEW_STROKE_S,
+    REST_S,
+    TrackingFilter,
+    noise_gain_per_s,
+)
 
 DELAY_S = 0.01
 

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from tactileq.rig.devices.monitoring.bare_thread import BareThread, Look, WakeUps
+from tactileq.rig.devices.monitoring.figures import Monitor
 from tactileq.rig.shared.live.child import Child
 from tactileq.rig.shared.live.memory import (
     BLOCK,
@@ -19,8 +21,6 @@ from tactileq.rig.shared.live.memory import (
     Rows,
 )
 from tactileq.rig.shared.live.messages import Done
-from tactileq.rig.devices.monitoring.bare_thread import BareThread, Look, WakeUps
-from tactileq.rig.devices.monitoring.figures import Monitor
 
 GRID = ((50.0, 350.0), (0.5, 3.5))
 

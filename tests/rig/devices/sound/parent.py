@@ -12,9 +12,9 @@ import time
 import numpy as np
 
 from tactileq.modeling.rendering.limits import Limits
+from tactileq.rig.devices.sound.output import SoundOutput
 from tactileq.rig.shared.live.clock import readable
 from tactileq.rig.shared.live.memory import Live
-from tactileq.rig.devices.sound.output import SoundOutput
 
 SIGNAL_G = np.ones(60 * 48000)
 

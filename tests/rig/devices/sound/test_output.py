@@ -20,14 +20,22 @@ from scipy.signal import lfilter
 from tactileq.modeling import InputError
 from tactileq.modeling.rendering.limits import Limits
 from tactileq.modeling.rendering.plan import RELEASE_S
-from tactileq.rig.shared.live.clock import now_s, sleep, taking_part
-from tactileq.rig.shared.live.memory import BLOCK, CONTACT, GONE, HEARTBEAT_S, NO_HEARTBEAT, STALE, Live
 from tactileq.rig.devices.sound.output import SoundOutput
 from tactileq.rig.devices.sound.supervision import SoundLost
+from tactileq.rig.shared.live.clock import now_s, sleep, taking_part
+from tactileq.rig.shared.live.memory import (
+    BLOCK,
+    CONTACT,
+    GONE,
+    HEARTBEAT_S,
+    NO_HEARTBEAT,
+    STALE,
+    Live,
+)
 from tests.modeling.rendering.lattices import planted_ar
 from tests.refusals import refused
-from tests.rig.shared.live.replay import Log, engine_of
 from tests.rig.planted import planted_model as model
+from tests.rig.shared.live.replay import Log, engine_of
 from tests.rig.waiting import wait_until
 
 HERE = Path(__file__).parent

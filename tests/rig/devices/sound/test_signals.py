@@ -20,11 +20,11 @@ from tactileq.modeling.files.tables import read_table
 from tactileq.modeling.rendering.limits import Limits
 from tactileq.modeling.rendering.plan import RenderPlan, plan_for
 from tactileq.modeling.vibrators.compensation import compensation_for
-from tactileq.rig.shared.live.memory import Live
 from tactileq.rig.devices.sound.output import SoundOutput
 from tactileq.rig.devices.sound.signal_limits import check_signal, largest_factor
 from tactileq.rig.devices.sound.signals import stimuli_of_surfaces, stimulus, tone_burst
 from tactileq.rig.devices.sound.supervision import SoundLost
+from tactileq.rig.shared.live.memory import Live
 from tactileq.stimuli.planted.textures import planted_texture
 from tactileq.stimuli.planted.vibrators import planted_vibrator
 from tactileq.stimuli.sets.recipe import Recipe

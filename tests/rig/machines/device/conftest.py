@@ -11,10 +11,11 @@ from collections.abc import Iterator
 import pytest
 
 from tactileq.rig.machines.board.emulating import Emulator
+from tactileq.rig.machines.device.machine import CABLE_DEVICE
 from tests.rig.machines.device.talking import free_port
 
 
 @pytest.fixture
 def device(given_clock: None) -> Iterator[Emulator]:
-    with Emulator("process", port=free_port()) as emulator:
+    with Emulator("process", CABLE_DEVICE, port=free_port()) as emulator:
         yield emulator

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 from tactileq.rig.machines.board.emulating import Emulator
+from tactileq.rig.machines.device.machine import CABLE_DEVICE
 from tactileq.rig.machines.device.virtual import TICK_HZ
 from tests.rig.machines.device.compiled import compiled_walks
 from tests.rig.machines.device.killing import ticks_after_kill
@@ -32,7 +33,7 @@ def main() -> None:
     talk.run(BENCH_S)
     faster = BENCH_S / (time.perf_counter() - begun_s)
     print(f"simulated device: {faster:.0f} x real time, {faster * TICK_HZ:.3g} ticks/s")
-    with Emulator("process") as device:
+    with Emulator("process", CABLE_DEVICE) as device:
         ticks = [ticks_after_kill(device.address, seed) for seed in range(KILLS)]
     print(f"kills {KILLS} shortest {min(ticks)} longest {max(ticks)}")
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tactileq.rig.machines.board.virtual import TICK_HZ, VirtualBoard, VirtualTransport
 from tactileq.rig.machines.device.definition import DEVICE
 from tactileq.rig.machines.device.registers import (
     DeviceCause,
@@ -16,7 +17,7 @@ from tactileq.rig.machines.device.registers import (
     DeviceSource,
     DeviceState,
 )
-from tactileq.rig.machines.device.virtual import TICK_HZ, VirtualBoard, VirtualTransport
+from tactileq.rig.machines.device.virtual import compiled_device
 from tactileq.rig.shared.wire.conversation import RECORD, Block, Conversation
 
 
@@ -24,7 +25,7 @@ class Talk(Conversation):
     """With the board's transport, and words for what tests do."""
 
     def __init__(self, board: VirtualBoard | None = None) -> None:
-        self.wire = VirtualTransport(board)
+        self.wire = VirtualTransport(board or VirtualBoard(compiled_device()))
         super().__init__(self.wire, DEVICE)
         self.hello()
 

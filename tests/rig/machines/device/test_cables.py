@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tactileq.rig.machines.board.virtual import TICK_HZ
 from tactileq.rig.machines.device.geometry import CableGeometry
 from tactileq.rig.machines.device.registers import (
     DeviceCause,
@@ -14,7 +15,7 @@ from tactileq.rig.machines.device.registers import (
     DeviceSource,
     DeviceState,
 )
-from tactileq.rig.machines.device.virtual import TICK_HZ, compiled_device
+from tactileq.rig.machines.device.virtual import compiled_device
 from tests.rig.machines.device.talking import Talk, joined
 
 X, Z, LEFT, RIGHT, HAND, _, _, WARM, _, RMS = range(10)  # of the register Emerged

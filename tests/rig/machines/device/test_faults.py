@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tactileq.modeling import InputError
+from tactileq.rig.machines.board.virtual import TICK_HZ, VirtualBoard, VirtualTransport
 from tactileq.rig.machines.device.definition import DEVICE
 from tactileq.rig.machines.device.models import device_model
 from tactileq.rig.machines.device.registers import (
@@ -16,7 +17,7 @@ from tactileq.rig.machines.device.registers import (
     DeviceState,
     DeviceStatus,
 )
-from tactileq.rig.machines.device.virtual import TICK_HZ, VirtualBoard, VirtualTransport
+from tactileq.rig.machines.device.virtual import compiled_device
 from tactileq.rig.shared.wire.conversation import Conversation, DeviceRefused
 from tactileq.rig.shared.wire.transports import TransportLost
 from tactileq.stimuli.planted.textures import planted_texture
@@ -217,7 +218,7 @@ def test_limits_stay_while_force_is_allowed() -> None:
 
 
 def test_records_beyond_the_baud_rate_are_refused() -> None:
-    talk = Talk(VirtualBoard(baud=115_200))
+    talk = Talk(VirtualBoard(compiled_device(), baud=115_200))
     assert talk.write("EventRate", 200) == 200
     with pytest.raises(DeviceRefused) as told:
         talk.write("EventRate", 1000)

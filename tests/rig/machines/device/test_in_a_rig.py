@@ -16,14 +16,15 @@ import pytest
 from tactileq.modeling import InputError
 from tactileq.rig.desk.desk_rig import DeskRig
 from tactileq.rig.desk.walls import largest_of
+from tactileq.rig.devices.hand.settings import HandSettings
 from tactileq.rig.machines.board.emulating import Emulator
 from tactileq.rig.machines.device.hand import DeviceHand
+from tactileq.rig.machines.device.machine import CABLE_DEVICE
 from tactileq.rig.machines.device.registers import DeviceCause, DeviceState
 from tactileq.rig.machines.force.hand import ForceHand
 from tactileq.rig.machines.force.settings import ForceSettings
 from tactileq.rig.machines.force.states import Cause, State
 from tactileq.rig.machines.force.wall import Wall
-from tactileq.rig.devices.hand.settings import HandSettings
 from tactileq.rig.shared.live.memory import CONTACT, FORCE_COMMANDED, GONE, SIMULATED, Live
 from tactileq.rig.shared.setup.rig_file import RigFile
 from tactileq.stimuli.planted.textures import planted_texture
@@ -161,7 +162,7 @@ def test_what_a_rig_file_says_of_a_device_has_to_fit(tmp_path: Path) -> None:
 def test_an_emulated_device_that_is_not_declared_is_refused() -> None:
     settings = ForceSettings(rate_hz=5000, watched=False)
     with (
-        Emulator("process") as device,
+        Emulator("process", CABLE_DEVICE) as device,
         Live.create() as live,
         refused(InputError, expected="a board with a hand", got="an emulated one"),
         DeviceHand(live, HandSettings(kind="force"), replace(settings, address=device.address)),

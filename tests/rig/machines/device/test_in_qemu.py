@@ -15,8 +15,9 @@ from typing import Any
 import pytest
 
 from tactileq.benches.rendering.rivals import layered_texture
+from tactileq.rig.machines.board.emulating import KINDS, Emulator, Kind, Machine, build_firmware
 from tactileq.rig.machines.device.definition import DEVICE
-from tactileq.rig.machines.board.emulating import KINDS, Emulator, Kind, build_firmware
+from tactileq.rig.machines.device.machine import CABLE_DEVICE
 from tactileq.rig.machines.device.models import device_model
 from tactileq.rig.machines.device.registers import DeviceCause, DeviceCommand, DeviceSource
 from tactileq.rig.shared.wire.conversation import Conversation, DeviceRefused
@@ -42,25 +43,23 @@ BAND = 0.2  # for other versions of the compiler
 class BuiltEmulator(Emulator):
     """Its firmware was compiled before, by one worker for all."""
 
-    def __init__(
-        self, kind: Kind, once_per_run: Callable[..., Any], *, recorder: bool = False
-    ) -> None:
-        super().__init__(kind, baud=FAST if kind == "stm32" else None, recorder=recorder)
+    def __init__(self, kind: Kind, machine: Machine, once_per_run: Callable[..., Any]) -> None:
+        super().__init__(kind, machine, baud=FAST if kind == "stm32" else None)
         self._once = once_per_run
 
     def _built(self) -> Path:
         def build(folder: Path) -> Path:
             file = folder / "firmware.elf"
-            return build_firmware(self._kind, file, baud=self._baud, recorder=self._recorder)
+            return build_firmware(self._kind, self._machine, file, baud=self._baud)
 
-        return Path(self._once(f"firmware-{'recorder-' * self._recorder}{self._kind}", build))
+        return Path(self._once(f"{self._machine.process}-{self._kind}", build))
 
 
 @pytest.fixture(scope="module", params=KINDS)
 def device(request: pytest.FixtureRequest, once_per_run: Callable[..., Any]) -> Iterator[Emulator]:
     if request.param != "process" and not HAS_QEMU:
         pytest.skip("qemu-system-arm and arm-none-eabi-gcc are not installed")
-    with BuiltEmulator(request.param, once_per_run) as emulator:
+    with BuiltEmulator(request.param, CABLE_DEVICE, once_per_run) as emulator:
         yield emulator
 
 

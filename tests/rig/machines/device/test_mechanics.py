@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from tactileq.rig.machines.board.virtual import TICK_HZ
 from tactileq.rig.machines.device.geometry import CableGeometry
-from tactileq.rig.machines.device.virtual import TICK_HZ, compiled_device
+from tactileq.rig.machines.device.virtual import compiled_device
 from tactileq.stimuli.planted.vibrators import SimulatedVibrator
 
 TICK_S = 1 / TICK_HZ

@@ -9,7 +9,12 @@ import scipy.signal
 from tactileq.modeling import Vibrator
 from tactileq.modeling.vibrators.exposure import hand_arm_sections
 from tactileq.rig.machines.device.models import DEVICE_LIMITS, device_model
-from tactileq.rig.machines.device.registers import DeviceCommand, DeviceSource, DeviceState, DeviceStatus
+from tactileq.rig.machines.device.registers import (
+    DeviceCommand,
+    DeviceSource,
+    DeviceState,
+    DeviceStatus,
+)
 from tactileq.rig.machines.device.virtual import TICK_HZ
 from tactileq.rig.shared.wire.conversation import DeviceRefused
 from tactileq.stimuli.planted.textures import planted_texture

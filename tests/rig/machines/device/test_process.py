@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from tactileq.modeling import InputError
-from tactileq.rig.machines.device.definition import DEVICE
 from tactileq.rig.machines.board.emulating import KINDS, Emulator, Kind, check_baud
+from tactileq.rig.machines.device.definition import DEVICE
+from tactileq.rig.machines.device.machine import CABLE_DEVICE
 from tactileq.rig.machines.device.models import device_model
 from tactileq.rig.machines.device.registers import DeviceCommand, DeviceSource, DeviceState
 from tactileq.rig.machines.device.virtual import TICK_HZ
@@ -103,7 +104,7 @@ def check_client_of_the_page(device: Emulator) -> None:
 
 @pytest.fixture
 def device(given_clock: None) -> Iterator[Emulator]:
-    with Emulator("process") as emulator:
+    with Emulator("process", CABLE_DEVICE) as emulator:
         yield emulator
 
 
@@ -130,7 +131,7 @@ def test_a_client_written_from_the_page_alone_talks_to_it(
 @pytest.mark.usefixtures("given_clock")
 def test_a_killed_or_stopped_host_costs_heartbeat_and_ramp(how: int) -> None:
     """601 ticks by the device's own clock; a hundred of them: tests.rig.machines.device.large."""
-    with Emulator("process") as emulator:
+    with Emulator("process", CABLE_DEVICE) as emulator:
         assert abs(ticks_after_kill(emulator.address, 3, how) - 601) <= 1
 
 

@@ -15,12 +15,12 @@ from tactileq.modeling import InputError
 from tactileq.rig.desk.checks import check_models
 from tactileq.rig.desk.desk_rig import DeskRig
 from tactileq.rig.desk.parts import vibration_output
+from tactileq.rig.devices.sound.supervision import HALTED
 from tactileq.rig.machines.board.emulating import Emulator
 from tactileq.rig.shared.interface import Stimulus, ToneBurst
 from tactileq.rig.shared.live.clock import sleep
 from tactileq.rig.shared.live.memory import HEARTBEAT_S, Live
 from tactileq.rig.shared.setup.rig_file import RigFile
-from tactileq.rig.devices.sound.supervision import HALTED
 from tactileq.stimuli.planted.textures import planted_texture
 from tests.modeling.rendering.lattices import planted_ar
 from tests.refusals import refused

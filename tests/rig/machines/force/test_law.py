@@ -13,10 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import tactileq.rig.machines.force
+from tactileq.rig.devices.hand.tracking import TrackingFilter
 from tactileq.rig.machines.force.settings import ForceSettings, Pose
 from tactileq.rig.machines.force.states import SENTENCES, Cause, ForceEvent, State
 from tactileq.rig.machines.force.wall import Wall, largest_stiffness_n_per_mm
-from tactileq.rig.devices.hand.tracking import TrackingFilter
 from tactileq.rig.shared.live.compiled import compiled
 from tests.rig.machines.force.law import TICK_S, WALL, Law
 

@@ -20,13 +20,13 @@ import pytest
 
 from tactileq.modeling import InputError
 from tactileq.rig.desk.desk_rig import DeskRig
+from tactileq.rig.devices.hand.settings import HandSettings
 from tactileq.rig.machines.force.dhd import DhdLibrary
 from tactileq.rig.machines.force.hand import ForceHand
 from tactileq.rig.machines.force.settings import ForceSettings
 from tactileq.rig.machines.force.standin import StandIn
 from tactileq.rig.machines.force.states import SENTENCES, Cause, State
 from tactileq.rig.machines.force.wall import Wall
-from tactileq.rig.devices.hand.settings import HandSettings
 from tactileq.rig.shared.live.clock import now_s, sleep, taking_part
 from tactileq.rig.shared.live.memory import (
     BUTTON,

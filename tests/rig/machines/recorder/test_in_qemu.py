@@ -15,6 +15,7 @@ from tactileq.rig.machines.device.virtual import TICK_HZ
 from tactileq.rig.machines.recorder.definition import RECORDER
 from tactileq.rig.machines.recorder.driver import DriverRecord, LinkedWire, Recorder, RecordRefused
 from tactileq.rig.machines.recorder.law import RecorderLaw, WantedRecord
+from tactileq.rig.machines.recorder.machine import SURFACE_RECORDER
 from tactileq.rig.machines.recorder.recording import REPEATED
 from tactileq.rig.machines.recorder.registers import RecorderCause, RecorderCommand, RecorderState
 from tactileq.rig.shared.wire.conversation import Conversation
@@ -47,7 +48,7 @@ pytestmark = [
 
 @pytest.fixture(scope="module", params=["m7", "stm32"])
 def emulator(request: pytest.FixtureRequest, once_per_run: Callable[..., Any]) -> Iterator[Any]:
-    with BuiltEmulator(request.param, once_per_run, recorder=True) as emulator:
+    with BuiltEmulator(request.param, SURFACE_RECORDER, once_per_run) as emulator:
         yield emulator
 
 
@@ -161,6 +162,6 @@ def test_instructions_are_those_of_the_page(emulator: BuiltEmulator) -> None:
 def test_firmware_for_motors_and_encoders_of_an_stm32_is_compiled(tmp_path: Path) -> None:
     """It is linked, too; nothing ran it."""
     file = build_firmware(
-        "stm32", tmp_path / "recorder.elf", baud=1_000_000, simulated=False, recorder=True
+        "stm32", SURFACE_RECORDER, tmp_path / "recorder.elf", baud=1_000_000, simulated=False
     )
     assert file.read_bytes().startswith(b"\x7fELF")

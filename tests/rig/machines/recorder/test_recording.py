@@ -19,14 +19,15 @@ import pytest
 from tactileq.modeling import InputError, RecordingSet
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.files.tables import read_cells
-from tactileq.rig.recording.capture.grid import StrokeGrid
-from tactileq.rig.recording.capture.input import InputBlock
-from tactileq.rig.recording.capture.pieces import Plan
 from tactileq.rig.machines.device.virtual import TICK_HZ
 from tactileq.rig.machines.recorder.driver import Recorder, RecordRefused, VirtualWire
 from tactileq.rig.machines.recorder.law import RecorderLaw
 from tactileq.rig.machines.recorder.recording import SETTLES_S, PlanRun
-from tactileq.rig.machines.recorder.registers import RecorderCause, RecorderSimulation, RecorderState
+from tactileq.rig.machines.recorder.registers import (
+    RecorderCause,
+    RecorderSimulation,
+    RecorderState,
+)
 from tactileq.rig.machines.recorder.sensors import (
     SETTLED_S,
     DrawnVibration,
@@ -34,7 +35,15 @@ from tactileq.rig.machines.recorder.sensors import (
     SensorRefused,
     SoundCardSensor,
 )
-from tactileq.rig.machines.recorder.store import PLAN_NAME, RECORDER_COLUMNS, TABLE_NAME, RecorderStore
+from tactileq.rig.machines.recorder.store import (
+    PLAN_NAME,
+    RECORDER_COLUMNS,
+    TABLE_NAME,
+    RecorderStore,
+)
+from tactileq.rig.recording.capture.grid import StrokeGrid
+from tactileq.rig.recording.capture.input import InputBlock
+from tactileq.rig.recording.capture.pieces import Plan
 from tests.refusals import refused
 from tests.rig.machines.recorder.test_evaluation import noise, written
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from tactileq.modeling import InputError
+from tactileq.rig.devices.sound import devices
 from tactileq.rig.recording.capture import input as audio
 from tactileq.rig.recording.capture.input import AudioInput, InputSettings
-from tactileq.rig.devices.sound import devices
 from tests.refusals import refused
 
 HERE = Path(__file__).parent

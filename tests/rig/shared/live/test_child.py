@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from tactileq.modeling import InputError
+from tactileq.rig.devices.sound.messages import Mask, Silence
 from tactileq.rig.shared.live import child
 from tactileq.rig.shared.live.child import Child, ChildLost
 from tactileq.rig.shared.live.messages import Done, Message, Refused
-from tactileq.rig.devices.sound.messages import Mask, Silence
 from tests.refusals import refused
 
 ROOT = Path(__file__).parents[4]
@@ -172,14 +172,17 @@ def test_its_rooms_are_those_of_its_parent_though_not_installed_and_though_files
 ) -> None:
     """A copy of the rooms, found by the parent's path alone; the working folder has a numpy.py."""
     house, work = tmp_path / "house", tmp_path / "work"
-    names = [f"rig/shared/live/{name}" for name in ("child", "clock", "compiled", "driven", "messages")]
+    names = [
+        f"rig/shared/live/{name}" for name in ("child", "clock", "compiled", "driven", "messages")
+    ]
     names += ["__init__", "rig/__init__", "rig/shared/live/__init__"]
     names += [f"modeling/{name}" for name in ("__init__", "face", "errors")]
     for file in (f"tactileq/{name}.py" for name in names):
         (house / file).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / file, house / file)
     (house / "tactileq/rig/telling.py").write_text(
-        "import tactileq.modeling.errors, numpy\nfrom tactileq.rig.shared.live.driven import Parent\n"
+        "import tactileq.modeling.errors, numpy\n"
+        "from tactileq.rig.shared.live.driven import Parent\n"
         "raise SystemExit(tactileq.modeling.errors.__file__)\n"
     )
     work.mkdir()

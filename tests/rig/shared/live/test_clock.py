@@ -14,9 +14,9 @@ from collections.abc import Iterator
 import pytest
 
 from tactileq.modeling import InputError
+from tactileq.rig.devices.hand.settings import HandSettings
 from tactileq.rig.machines.force.hand import ForceHand
 from tactileq.rig.machines.force.settings import ForceSettings
-from tactileq.rig.devices.hand.settings import HandSettings
 from tactileq.rig.shared.live.clock import (
     GivenClock,
     next_of,

@@ -48,7 +48,9 @@ def test_rows_have_the_layout_of_the_header() -> None:
 
 
 def test_the_memory_of_a_killed_maker_goes_with_the_next_one() -> None:
-    making = "import sys\nfrom tactileq.rig.shared.live.memory import Live\nwith Live.create() as live: "
+    making = (
+        "import sys\nfrom tactileq.rig.shared.live.memory import Live\nwith Live.create() as live: "
+    )
     told = [making + "print(live.path, flush=True); sys.stdin.read()"]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     with ExitStack() as stack:
@@ -169,7 +171,11 @@ def test_another_file_is_refused(tmp_path: Path, size: int | None) -> None:
 
 def test_the_clock_is_the_same_in_every_process() -> None:
     before = now_s()
-    command = [sys.executable, "-c", "from tactileq.rig.shared.live.clock import now_s; print(now_s())"]
+    command = [
+        sys.executable,
+        "-c",
+        "from tactileq.rig.shared.live.clock import now_s; print(now_s())",
+    ]
     there = float(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
     assert before < there < now_s()
 

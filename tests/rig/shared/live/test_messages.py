@@ -14,17 +14,17 @@ from hypothesis import strategies as st
 
 from tactileq.modeling import InputError
 from tactileq.modeling.rendering.plan import RenderCounters
-from tactileq.rig.recording.capture.input import InputSettings
 from tactileq.rig.desk import messages as pen
-from tactileq.rig.machines.force import messages  # noqa: F401
-from tactileq.rig.machines.force.settings import ForceSettings, Pose
 from tactileq.rig.devices.hand import messages as hand
 from tactileq.rig.devices.hand.settings import HandSettings
-from tactileq.rig.shared.live.messages import Message, Refused, decoded, received, send
 from tactileq.rig.devices.monitoring import bare_thread  # noqa: F401 (its messages)
 from tactileq.rig.devices.simulated import process  # noqa: F401
 from tactileq.rig.devices.simulated.vibrator import SimulatedTransducers
 from tactileq.rig.devices.sound import messages as sound
+from tactileq.rig.machines.force import messages  # noqa: F401
+from tactileq.rig.machines.force.settings import ForceSettings, Pose
+from tactileq.rig.recording.capture.input import InputSettings
+from tactileq.rig.shared.live.messages import Message, Refused, decoded, received, send
 from tests.refusals import refused
 
 UNIONS = (sound.Request, hand.Report, pen.Request)

@@ -14,8 +14,8 @@ from contextlib import contextmanager, suppress
 import pytest
 
 from tactileq.modeling import InputError
+from tactileq.rig.machines.board.virtual import VirtualTransport
 from tactileq.rig.machines.device.definition import DEVICE
-from tactileq.rig.machines.device.virtual import VirtualTransport
 from tactileq.rig.shared.wire.conversation import Conversation
 from tactileq.rig.shared.wire.envelope import REPLY, WireFrame, WireReader
 from tactileq.rig.shared.wire.transports import SerialTransport, SocketTransport, TransportLost

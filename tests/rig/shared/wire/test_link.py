@@ -14,8 +14,9 @@ from pathlib import Path
 import pytest
 
 from tactileq.modeling import InputError
-from tactileq.rig.machines.device.definition import DEVICE
 from tactileq.rig.machines.board.emulating import Emulator
+from tactileq.rig.machines.device.definition import DEVICE
+from tactileq.rig.machines.device.machine import CABLE_DEVICE
 from tactileq.rig.machines.device.models import device_model
 from tactileq.rig.machines.device.registers import DeviceCause, DeviceCommand, DeviceState
 from tactileq.rig.shared.live.clock import now_s, sleep, taking_part
@@ -84,7 +85,7 @@ class Cable:
 
 @pytest.fixture
 def cable(tmp_path: Path) -> Iterator[Cable]:
-    with Emulator("process") as device:
+    with Emulator("process", CABLE_DEVICE) as device:
         found = Cable(device.address, tmp_path)
         try:
             yield found

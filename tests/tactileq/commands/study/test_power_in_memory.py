@@ -25,13 +25,6 @@ from tactileq.analysis.statistics.participants.posterior import Effort
 from tactileq.analysis.statistics.verdicts import people_data
 from tactileq.benches.validation.procedures import cells, simulate_cell
 from tactileq.commands.study.power import planted_effects, sizes_of
-from tactileq.experiments.observers.in_memory import simulate_sessions
-from tactileq.experiments.observers.whole_study import simulate_study
-from tactileq.experiments.study.models import ModelSets
-from tactileq.experiments.study.study import Study
-from tactileq.experiments.study.task_plan import TaskPlan
-from tactileq.modeling import InputError, Threshold, simplify
-from tactileq.modeling.files.claims import ClaimSection, PlanSection
 from tactileq.commands.study.power_in_memory import (
     SimulatedStudy,
     chances,
@@ -40,6 +33,13 @@ from tactileq.commands.study.power_in_memory import (
     responses_of,
     simulated_verdicts,
 )
+from tactileq.experiments.observers.in_memory import simulate_sessions
+from tactileq.experiments.observers.whole_study import simulate_study
+from tactileq.experiments.study.models import ModelSets
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.study.task_plan import TaskPlan
+from tactileq.modeling import InputError, Threshold, simplify
+from tactileq.modeling.files.claims import ClaimSection, PlanSection
 from tactileq.rig.desk.twin import SimulatedRig
 from tactileq.stimuli.planted.textures import planted_texture
 from tactileq.workers import working
