@@ -159,15 +159,9 @@ def test_the_core_needs_none_of_what_extras_install(tmp_path: Path) -> None:
         text=True,
     )
     assert done.returncode == 0, done.stderr
-    wire = (
-        *(
-            "tactileq.rig.shared.wire.",
-            "tactileq.rig.machines.device.",
-            "tactileq.rig.desk.device_twin",
-            "tactileq.rig.machines.recorder.",
-        ),
-        "tactileq.benches.recorder.",
-    )
+    rig = "tactileq.rig."
+    wire = tuple(f"{rig}{room}." for room in ("shared.wire", "machines.board", "machines.device"))
+    wire += (f"{rig}machines.recorder.", f"{rig}desk.device_twin", "tactileq.benches.recorder.")
     assert {name for name in done.stdout.split() if not name.startswith(wire)} <= {
         "tactileq.rig.devices.hand.serial_sensor",
         "tactileq.experiments.console.events",

@@ -19,7 +19,7 @@ from tests.rig.desk.rig_files import rig_file
 Jack = Callable[..., AbstractContextManager[Any]]
 Run = Callable[..., subprocess.CompletedProcess[str]]
 ROOT = Path(__file__).parents[2]
-RECORDER = ROOT / "tests" / "rig" / "sound" / "recorder.py"
+RECORDER = ROOT / "tests/rig/devices/sound/recorder.py"
 TONE = ["rig", "play", "--rig", "rig.toml", "--tone", "250", "--amplitude", "1.5"]
 RECIPE = """
 version = 1

@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 
 from tactileq.rig.machines.board.emulating import Emulator
+from tactileq.rig.machines.board.virtual import TICK_HZ
 from tactileq.rig.machines.device.machine import CABLE_DEVICE
-from tactileq.rig.machines.device.virtual import TICK_HZ
 from tests.rig.machines.device.compiled import compiled_walks
 from tests.rig.machines.device.killing import ticks_after_kill
 from tests.rig.machines.device.talking import Talk

@@ -8,6 +8,7 @@ import scipy.signal
 
 from tactileq.modeling import Vibrator
 from tactileq.modeling.vibrators.exposure import hand_arm_sections
+from tactileq.rig.machines.board.virtual import TICK_HZ
 from tactileq.rig.machines.device.models import DEVICE_LIMITS, device_model
 from tactileq.rig.machines.device.registers import (
     DeviceCommand,
@@ -15,7 +16,6 @@ from tactileq.rig.machines.device.registers import (
     DeviceState,
     DeviceStatus,
 )
-from tactileq.rig.machines.device.virtual import TICK_HZ
 from tactileq.rig.shared.wire.conversation import DeviceRefused
 from tactileq.stimuli.planted.textures import planted_texture
 from tactileq.stimuli.planted.vibrators import planted_vibrator

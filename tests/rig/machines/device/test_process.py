@@ -10,18 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tactileq.modeling import InputError
-from tactileq.rig.machines.board.emulating import KINDS, Emulator, Kind, check_baud
+from tactileq.rig.machines.board.emulating import Emulator
+from tactileq.rig.machines.board.virtual import TICK_HZ
 from tactileq.rig.machines.device.definition import DEVICE
 from tactileq.rig.machines.device.machine import CABLE_DEVICE
 from tactileq.rig.machines.device.models import device_model
 from tactileq.rig.machines.device.registers import DeviceCommand, DeviceSource, DeviceState
-from tactileq.rig.machines.device.virtual import TICK_HZ
 from tactileq.rig.shared.live.clock import now_s, readable, sleep, taking_part
 from tactileq.rig.shared.wire.conversation import Conversation
 from tactileq.rig.shared.wire.transports import opened_transport
 from tactileq.stimuli.planted.textures import planted_texture
-from tests.refusals import refused
 from tests.rig.machines.device import independent_client
 from tests.rig.machines.device.independent_client import Client
 from tests.rig.machines.device.killing import BAUD, ticks_after_kill
@@ -133,17 +131,3 @@ def test_a_killed_or_stopped_host_costs_heartbeat_and_ramp(how: int) -> None:
     """601 ticks by the device's own clock; a hundred of them: tests.rig.machines.device.large."""
     with Emulator("process", CABLE_DEVICE) as emulator:
         assert abs(ticks_after_kill(emulator.address, 3, how) - 601) <= 1
-
-
-@pytest.mark.parametrize(
-    ("kind", "baud"), [("m7", 9000), ("m7", 1_515_000), ("stm32", 6_000_000), ("stm32", 0)]
-)
-def test_a_baud_rate_that_the_board_cannot_have_is_refused(kind: Kind, baud: int) -> None:
-    with refused(InputError, expected="baud", got=baud):
-        check_baud(kind, baud)
-
-
-def test_usual_baud_rates_are_taken() -> None:
-    for kind in KINDS:
-        for baud in (115_200, 500_000):
-            check_baud(kind, baud)

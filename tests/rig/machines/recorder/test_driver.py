@@ -7,7 +7,7 @@ import pytest
 
 from tactileq.modeling import InputError
 from tactileq.modeling.arrays import Floats
-from tactileq.rig.machines.device.virtual import TICK_HZ
+from tactileq.rig.machines.board.virtual import TICK_HZ
 from tactileq.rig.machines.recorder.driver import Recorder, RecordRefused, VirtualWire
 from tactileq.rig.machines.recorder.law import RecorderLaw, WantedRecord
 from tactileq.rig.machines.recorder.registers import (

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from tactileq.rig.machines.board.emulating import build_firmware
-from tactileq.rig.machines.device.virtual import TICK_HZ
+from tactileq.rig.machines.board.virtual import TICK_HZ
 from tactileq.rig.machines.recorder.definition import RECORDER
 from tactileq.rig.machines.recorder.driver import DriverRecord, LinkedWire, Recorder, RecordRefused
 from tactileq.rig.machines.recorder.law import RecorderLaw, WantedRecord

@@ -19,7 +19,7 @@ import pytest
 from tactileq.modeling import InputError, RecordingSet
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.files.tables import read_cells
-from tactileq.rig.machines.device.virtual import TICK_HZ
+from tactileq.rig.machines.board.virtual import TICK_HZ
 from tactileq.rig.machines.recorder.driver import Recorder, RecordRefused, VirtualWire
 from tactileq.rig.machines.recorder.law import RecorderLaw
 from tactileq.rig.machines.recorder.recording import SETTLES_S, PlanRun
