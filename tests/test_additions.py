@@ -176,7 +176,7 @@ for data in ("data", "without"):
 def house(tmp_path: Path) -> Path:
     for room in ROOMS:
         kept_out = shutil.ignore_patterns("__pycache__")
-        shutil.copytree(ROOT / room, tmp_path / "house" / room, ignore=kept_out)
+        shutil.copytree(ROOT / room, tmp_path / "house" / room, ignore=kept_out, symlinks=True)
     return tmp_path / "house"
 
 
@@ -210,12 +210,13 @@ def touched(house: Path) -> dict[str, int]:
 
 
 def test_a_command_costs_one_file_and_one_line(house: Path) -> None:
-    (house / "tactileq/commands/greet.py").write_text(COMMAND, encoding="utf-8")
+    (house / "tactileq/commands/benches/greet.py").write_text(COMMAND, encoding="utf-8")
     app = house / "tactileq/app.py"
     text = app.read_text(encoding="utf-8")
-    last = '    "demo": "demo",\n'
-    app.write_text(text.replace(last, last + '    "greet": "greet",\n'), encoding="utf-8")
-    assert touched(house) == {"tactileq/app.py": 1, "tactileq/commands/greet.py": 15}
+    last = '    "demo": "benches.demo",\n'
+    added = last + '    "greet": "benches.greet",\n'
+    app.write_text(text.replace(last, added), encoding="utf-8")
+    assert touched(house) == {"tactileq/app.py": 1, "tactileq/commands/benches/greet.py": 15}
     assert "Greet somebody." in run(house, "-m", "tactileq", "--help").stdout
     assert "--seed" in run(house, "-m", "tactileq", "greet", "--help").stdout
     assert run(house, "-m", "tactileq", "greet", "you", "--seed", "4").stdout == "hello you, 4\n"

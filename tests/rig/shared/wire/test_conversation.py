@@ -14,8 +14,9 @@ from contextlib import contextmanager, suppress
 import pytest
 
 from tactileq.modeling import InputError
-from tactileq.rig.machines.board.virtual import VirtualTransport
+from tactileq.rig.machines.board.virtual import VirtualBoard, VirtualTransport
 from tactileq.rig.machines.device.definition import DEVICE
+from tactileq.rig.machines.device.virtual import compiled_device
 from tactileq.rig.shared.wire.conversation import Conversation
 from tactileq.rig.shared.wire.envelope import REPLY, WireFrame, WireReader
 from tactileq.rig.shared.wire.transports import SerialTransport, SocketTransport, TransportLost
@@ -26,7 +27,7 @@ class DamagedWire(VirtualTransport):
     """A board behind a wire on which a share of the bytes is lost or damaged, both ways."""
 
     def __init__(self, seed: int, share: float) -> None:
-        super().__init__()
+        super().__init__(VirtualBoard(compiled_device()))
         self._chance = random.Random(seed)
         self._share = share
 
