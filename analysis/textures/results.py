@@ -20,6 +20,7 @@ from tactileq.modeling import (
 from tactileq.modeling.errors import shown
 from tactileq.modeling.files.columns import Column
 from tactileq.modeling.fitting.conditions import recording_spectra
+from tactileq.modeling.reprs import one_line
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +51,8 @@ class TextureResult:
     truth: TextureModel | None = None
     other_estimates: tuple[TextureModel, ...] = ()
     left_out: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+
+    __repr__ = one_line
 
     @property
     def texture(self) -> str:

@@ -23,6 +23,7 @@ import numpy as np
 
 from tactileq.experiments.study.study import TASKS, Study
 from tactileq.modeling.checks import check_whole
+from tactileq.modeling.reprs import one_line
 from tactileq.modeling.seeds import generator, number_of
 
 Phase = Literal["training", "main"]
@@ -232,6 +233,8 @@ class SessionPlan:
     session: int
     slot: int
     trials: tuple[Trial, ...]
+
+    __repr__ = one_line
 
     def to_dict(self) -> dict[str, Any]:
         """The plan as plain values."""

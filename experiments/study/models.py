@@ -15,6 +15,7 @@ from tactileq.modeling.files.stimulus_table import MANIFEST as STIMULI
 from tactileq.modeling.models.compiled_for import CompiledFor
 from tactileq.modeling.models.loading import load_any_models
 from tactileq.modeling.models.loading import made_from as model_made_from
+from tactileq.modeling.reprs import one_line
 from tactileq.modeling.scenes.compiled import FILE as SCENE
 from tactileq.modeling.scenes.loading import scene_files, scene_models
 from tactileq.rig.devices.sound.signals import stimuli_of_surfaces
@@ -39,6 +40,8 @@ class ModelSets:
     """
 
     sets: Mapping[str, Mapping[str, Presentable]]
+
+    __repr__ = one_line
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -28,6 +28,7 @@ from tactileq.modeling.files.claims import ClaimSection, PlanSection
 from tactileq.modeling.files.described import DescribedFile, FileSection, key
 from tactileq.modeling.files.hashes import sha256_of_values
 from tactileq.modeling.files.kinds import Label, ListedLabel, is_different, is_label, is_line
+from tactileq.modeling.reprs import one_line
 
 # Their order is part of every seed: new ones go to the end.
 TASKS = tuple(dict.fromkeys(("absolute", "relative", "oddity", "threshold", *ANSWER_TABLES)))
@@ -164,6 +165,8 @@ class Study(DescribedFile):
         Mapping[str, TaskPlan],
         key("those of the paper are planned as there where they are not named", tables=TASKS),
     ] = field(default_factory=dict)
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -11,6 +11,7 @@ from tactileq.modeling.arrays import Floats
 from tactileq.modeling.checks import check_rate
 from tactileq.modeling.equalizer.bands import band_response, band_rms, check_bands
 from tactileq.modeling.errors import InputError
+from tactileq.modeling.reprs import one_line
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -39,6 +40,8 @@ class PEQ:
     bandwidths_hz: Floats
     gains: Floats
     rate_hz: float
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         for name in ("frequencies_hz", "bandwidths_hz", "gains"):

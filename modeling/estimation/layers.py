@@ -10,6 +10,7 @@ import numpy as np
 from tactileq.modeling.arrays import Bools, Floats
 from tactileq.modeling.equalizer.peq import PEQ
 from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.reprs import one_line
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +37,8 @@ class Layers:
     gains: Floats
     level_sd_db: Floats
     unresolved: Bools
+
+    __repr__ = one_line
 
     def peq(self, *, rate_hz: float) -> PEQ:
         """The equalizer of these layers at the rate of the spectrum they were found in."""

@@ -21,6 +21,7 @@ from tactileq.modeling.models.line_spectral import (
     reflection_coefficients,
 )
 from tactileq.modeling.models.parameter_table import flushed_to_zero
+from tactileq.modeling.reprs import one_line
 
 
 class ARParameters(NamedTuple):
@@ -52,6 +53,8 @@ class ARFilter:
     coefficients: Floats
     gain: float
     rate_hz: float
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         coefficients = np.array(self.coefficients, dtype=np.float64)
@@ -130,6 +133,8 @@ class ARModel(SavedModel):
         Bools,
         key("condition without a recording, filled from its neighbours", shape="speeds forces"),
     ] = field(default_factory=no_marks)
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         super().__post_init__()

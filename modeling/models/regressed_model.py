@@ -22,6 +22,7 @@ from tactileq.modeling.models.grid import Forces, Speeds
 from tactileq.modeling.models.parameter_table import Parameters, ParameterTable
 from tactileq.modeling.models.terms import CENTROID, DRIVING_TERMS, DrivenBy
 from tactileq.modeling.models.texture_model import first_peq
+from tactileq.modeling.reprs import one_line
 
 _COEFFICIENTS = ("noise_gain", "frequencies_hz", "bandwidths_hz", "amplitudes", "centroid_hz")
 _LAYERS = "coefficients layers"
@@ -69,6 +70,8 @@ class RegressedModel(SavedModel):
     unit: Unit = "g"
     simulated: Simulated = False
     compiled_for: Annotated[CompiledFor | None, key("as in `TextureModel`")] = None
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         super().__post_init__()

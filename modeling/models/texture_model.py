@@ -26,6 +26,7 @@ from tactileq.modeling.models.parameter_table import (
     logarithmic_nodes,
     wide_enough,
 )
+from tactileq.modeling.reprs import one_line
 
 Blending = Literal["linear", "logarithmic"]
 BLENDINGS: tuple[Blending, ...] = ("linear", "logarithmic")
@@ -101,6 +102,8 @@ class TextureModel(SavedModel):
             "says nothing"
         ),
     ] = None
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         super().__post_init__()

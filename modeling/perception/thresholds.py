@@ -21,6 +21,7 @@ from tactileq.modeling.files.described import FileSection, key
 from tactileq.modeling.files.hashes import sha256_of_values
 from tactileq.modeling.files.reading import read_text
 from tactileq.modeling.files.tables import read_cells, typed
+from tactileq.modeling.reprs import one_line
 
 STANDARD_GRAVITY_M_S2 = 9.80665
 SHIPPED = ("codec", "pen-hold", "mobile")
@@ -85,6 +86,8 @@ class Threshold(FileSection):
     ]
     source: Annotated[str, key("where the numbers come from")]
     caveat: Annotated[str, key("what speaks against them")]
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         super().__post_init__()

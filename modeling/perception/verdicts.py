@@ -13,6 +13,7 @@ from tactileq.modeling.files.described_json import DescribedJson
 from tactileq.modeling.files.hashes import sha256_of_values
 from tactileq.modeling.models.texture_model import TextureModel
 from tactileq.modeling.perception.thresholds import Threshold
+from tactileq.modeling.reprs import one_line
 
 CriterionName = Literal["energy", "paper-fft", "paper-gain"]
 CRITERIA: tuple[CriterionName, ...] = ("energy", "paper-fft", "paper-gain")
@@ -98,6 +99,8 @@ class Simplification(DescribedJson):
     layers: Annotated[tuple[LayerVerdict, ...], key("one per layer of the full model, in order")]
     model: Annotated[TextureModel, key("simplified")]
     sha256: Annotated[str, key("of all the rest")] = ""
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -18,6 +18,7 @@ from tactileq.modeling.checks import (
     check_texture_name,
 )
 from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.reprs import one_line
 
 MIN_SAMPLES = 64
 
@@ -64,6 +65,8 @@ class Recording:
     simulated: bool = False
     repeat: int = 1
     clipped_share: float = np.nan
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         check_texture_name(self.texture)

@@ -254,6 +254,14 @@ def is_recording_set(folder: Path) -> bool:
     return (folder / INDEX_NAME).is_file() or bool(_sidecar_files(folder))
 
 
+def recording_folders(folder: Path) -> list[Path]:
+    """The folder itself where it is a recording set, else its sub-folders that are, by name."""
+    if is_recording_set(folder) or not folder.is_dir():
+        return [folder]
+    below = sorted(path for path in folder.iterdir() if path.is_dir() and is_recording_set(path))
+    return below or [folder]
+
+
 def textures_in(folder: str | Path) -> tuple[str, ...]:
     """Names of the textures that a folder lists (none in an empty list); no samples are read."""
     return tuple(dict.fromkeys(row["texture"] for row in listed(Path(folder))))

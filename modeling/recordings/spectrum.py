@@ -13,6 +13,7 @@ from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import InputError
 from tactileq.modeling.recordings.recording import Recording
 from tactileq.modeling.recordings.sinusoids import Sinusoids, find_sinusoids, without_hum
+from tactileq.modeling.reprs import one_line
 
 MODEL_RATE_HZ = 5000.0
 HIGH_PASS_HZ = 10.0
@@ -55,6 +56,8 @@ class Spectrum:
     share: Floats | float = 1.0
     tapered_magnitude: Floats | None = None
     notes: tuple[str, ...] = ()
+
+    __repr__ = one_line
 
     @property
     def without_leakage(self) -> Floats:

@@ -128,6 +128,9 @@ class Renderer:
         else:
             self._engine = PythonEngine(BandFilter(model, plan), plan, key=key)
 
+    def __repr__(self) -> str:
+        return f"<Renderer of a {type(self.model).__name__} at {self.rate_hz:g} Hz>"
+
     @property
     def counters(self) -> RenderCounters:
         """What the renderer had to correct so far."""

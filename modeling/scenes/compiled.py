@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from math import acos
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,6 +17,7 @@ from tactileq.modeling.models.texture_model import TextureModel
 from tactileq.modeling.rendering.cost import Cost
 from tactileq.modeling.rendering.plan import RenderPlan
 from tactileq.modeling.rendering.renderer import Renderer
+from tactileq.modeling.reprs import one_line
 from tactileq.modeling.scenes.cost import Rendered, in_one_precision, scene_bytes
 from tactileq.modeling.scenes.scene import Scene
 
@@ -49,6 +51,14 @@ class Measured:
     worst: float
     place: str
     of_full: float
+
+    @property
+    def share(self) -> float:
+        """Of the bound that the worst place takes; of a GFC, of the angle whose cosine it is."""
+        worst, bound = self.worst, self.bound
+        if self.measure == "gfc30":
+            worst, bound = acos(worst), acos(bound)
+        return worst / bound if bound else 0.0
 
 
 @dataclass(frozen=True)
@@ -151,6 +161,8 @@ class CompiledScene:
 
     scene: Scene
     textures: tuple[CompiledTexture, ...]
+
+    __repr__ = one_line
 
     @property
     def models(self) -> dict[str, Layered]:

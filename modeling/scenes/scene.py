@@ -19,6 +19,7 @@ from tactileq.modeling.files.kinds import Name, Rate, TextureNames
 from tactileq.modeling.files.values import NameOrFile
 from tactileq.modeling.perception.thresholds import Threshold
 from tactileq.modeling.rendering.limits import Limits
+from tactileq.modeling.reprs import one_line
 from tactileq.modeling.scenes.hands import HandTable, HandUse, check_order
 from tactileq.modeling.scenes.microcontrollers import MicroController
 
@@ -205,6 +206,8 @@ class Scene:
     budget: Budget = field(default_factory=Budget)
     models: Path | None = None
     files: tuple[Path, ...] = ()
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         for name in ("name", "textures", "margin_db"):

@@ -14,6 +14,7 @@ from tactileq.modeling.errors import InputError
 from tactileq.modeling.files.described import key
 from tactileq.modeling.files.kinds import Rate, Simulated
 from tactileq.modeling.files.saved_model import SavedModel
+from tactileq.modeling.reprs import one_line
 
 _Positive = Annotated[float, key(gt=0)]
 
@@ -47,6 +48,8 @@ class Vibrator(SavedModel):
     ]
     curve_coherence: Annotated[Floats, key("γ² of response and drive, 0…1", shape="steps")]
     simulated: Simulated = False
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         super().__post_init__()

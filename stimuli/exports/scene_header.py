@@ -10,7 +10,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from tactileq.modeling import InputError
+from tactileq.modeling import CompiledScene, InputError
 from tactileq.modeling.errors import counted
 from tactileq.modeling.rendering.noise import seed_mix
 from tactileq.modeling.rendering.plan import RenderPlan
@@ -108,6 +108,17 @@ def scene_header(
 
 
 # --- Checks ---------------------------------------------------------------------------------------
+
+
+def compiled_header(compiled: CompiledScene, file_name: str, *, seed: int) -> str:
+    """All textures of a compiled scene as one header, in single precision where all may be."""
+    scene = compiled.scene
+    bound = ", ".join(f"{measure} {value:g}" for measure, value in scene.bound.to_dict().items())
+    note = (
+        f"Compiled for the scene with SHA-256 {scene.sha256}; bound: {bound}. Beyond the scene the "
+        "nearest edge is rendered, and samples are counted (above_grid, below_grid)."
+    )
+    return scene_header(file_name, scene.name, compiled.rendered, seed=seed, note=note)
 
 
 def _check(rendered: Rendered) -> None:

@@ -303,19 +303,9 @@ def _nearness(fit: FitSummary) -> str:
     return f"{text}; by --layers instead {others}" if others else text
 
 
-def recording_folders(folder: Path) -> list[Path]:
-    """The folder itself where it is a recording set, else its sub-folders that are, by name."""
-    from tactileq.modeling.recordings.recording_set import is_recording_set
-
-    if is_recording_set(folder) or not folder.is_dir():
-        return [folder]
-    below = sorted(path for path in folder.iterdir() if path.is_dir() and is_recording_set(path))
-    return below or [folder]
-
-
 def _sources_in(folders: Iterable[Path]) -> tuple[list[TextureSource], list[TextureOutcome]]:
     """All textures in these folders, and the folders whose list cannot be read."""
-    from tactileq.modeling.recordings.recording_set import textures_in
+    from tactileq.modeling.recordings.recording_set import recording_folders, textures_in
 
     sources: list[TextureSource] = []
     unreadable: list[TextureOutcome] = []

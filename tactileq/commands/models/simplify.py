@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactileq.commands.models.many_textures import recording_folders
 from tactileq.modeling.errors import counted
 from tactileq.options import Criterion, HoldAbove, Margin, ModelFile, ThresholdName
 from tactileq.own_results import check_own_files, write_own_files
@@ -160,7 +159,7 @@ def draw_condition(
 
 def _recordings_of(texture: str, folder: Path) -> RecordingSet:
     """The recordings of one texture in a folder, or in the sub-folder that holds them."""
-    from tactileq.modeling.recordings.recording_set import textures_in
+    from tactileq.modeling.recordings.recording_set import recording_folders, textures_in
 
     for found in recording_folders(folder):
         if texture in textures_in(found):

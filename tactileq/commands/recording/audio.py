@@ -18,14 +18,11 @@ from tactileq.modeling.errors import counted
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from tactileq.rig.devices.hand.reader import HandReader
     from tactileq.rig.devices.hand.settings import HandSettings
-    from tactileq.rig.recording.capture.cutting import Readings
     from tactileq.rig.recording.capture.grid import StrokeGrid
     from tactileq.rig.recording.capture.input import InputSettings
     from tactileq.rig.recording.capture.pieces import Plan
     from tactileq.rig.recording.capture.recorder import StrokeRecorder
-    from tactileq.rig.shared.live.memory import Live
     from tactileq.rig.shared.setup.rig_file import RigFile
 
 STEP_S = 0.05
@@ -182,6 +179,7 @@ def record_on(
 ) -> None:
     """Open the devices, and record until the grid is full."""
     from tactileq.rig.desk.lock import rig_locked
+    from tactileq.rig.devices.hand.opening import opened_hand, since_now
     from tactileq.rig.recording.capture.input import AudioInput
     from tactileq.rig.recording.capture.pieces import PieceStore, Plan
     from tactileq.rig.recording.capture.recorder import StrokeRecorder
@@ -246,28 +244,6 @@ def print_assumed(rig: RigFile) -> None:
             f"note: the input's scale of {scale.value:g} g per full scale is assumed "
             f"({scale.source}), and so are all levels."
         )
-
-
-def since_now(live: Live) -> Callable[[], Readings]:
-    """Gives the readings of the hand since its last call."""
-    count = live.readings_written
-
-    def readings() -> Readings:
-        nonlocal count
-        count, rows = live.readings_since(count)
-        return rows
-
-    return readings
-
-
-@contextmanager
-def opened_hand(hand: HandSettings) -> Iterator[tuple[Live, HandReader]]:
-    """The shared memory, and the hand that writes its readings into it."""
-    from tactileq.rig.devices.hand.reader import HandReader
-    from tactileq.rig.shared.live.memory import Live
-
-    with Live.create() as live, HandReader(live, hand) as reader:
-        yield live, reader
 
 
 def run(recorder: StrokeRecorder, faults: Callable[[], tuple[str, ...]]) -> None:

@@ -12,9 +12,7 @@ import typer
 from tactileq.commands.recording.audio import (
     HandOptions,
     hand_from,
-    opened_hand,
     rig_from,
-    since_now,
 )
 from tactileq.modeling.errors import counted
 from tactileq.options import AssumedForce, CountsPerMm, HandDevice, HandKind, OptionalRigPath, Out
@@ -76,6 +74,8 @@ def rig_range(
 def watched(settings: HandSettings, seconds: float) -> Readings:
     """The readings of a hand over this time."""
     import numpy as np
+
+    from tactileq.rig.devices.hand.opening import opened_hand, since_now
 
     with opened_hand(settings) as (live, reader):
         readings, rows = since_now(live), []

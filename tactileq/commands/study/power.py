@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactileq.commands.study.power_in_memory import chances, people_of, planned_for
+from tactileq.commands.study.chances import chances
 from tactileq.commands.study.session import models_of_study
 from tactileq.modeling.errors import shown
 from tactileq.options import (
@@ -75,6 +75,7 @@ def power(
 
     Example: tactileq power study.toml --subjects 12,48,12 --effect magnitude_similarity=0
     """
+    from tactileq.benches.power.in_memory import people_of, planned_for
     from tactileq.experiments.study.study import Study
     from tactileq.modeling.files.hashes import sha256_of_paths
 

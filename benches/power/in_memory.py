@@ -1,19 +1,13 @@
-"""Studies with simulated people in memory, from answers to verdicts: what `power` counts."""
+"""A study with simulated people in memory, from answers to verdicts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
-from time import monotonic
 from typing import TYPE_CHECKING
 
-from tactileq.workers import working
-
 if TYPE_CHECKING:
-    import pandas as pd
-
     from tactileq.analysis.answers.responses import PlannedTask, Responses
     from tactileq.analysis.power.power import Verdict
     from tactileq.analysis.statistics.participants.posterior import Effort
@@ -22,14 +16,6 @@ if TYPE_CHECKING:
     from tactileq.experiments.observers.psychometrics import Psychometrics
     from tactileq.experiments.study.models import ModelSets
     from tactileq.experiments.study.study import Study
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from tactileq.experiments.study.study import Study
-
-FIRST_ANSWER_S = 12.0  # then the next simulation to end is waited for
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -125,67 +111,6 @@ def people_of(
     return SimulatedStudy(
         study=study, models=sets, perception=perception, psychometrics=psychometrics
     )
-
-
-def chances(
-    people: SimulatedStudy,
-    sizes: Sequence[int],
-    *,
-    simulations: int,
-    seed: int,
-    jobs: int | None = None,
-    dask: str | None = None,
-    effort: Effort | None = None,
-    advance: Callable[[str], None] = lambda item: None,
-    first: Callable[[pd.DataFrame, float], None] = lambda table, left_s: None,
-) -> pd.DataFrame:
-    """The chance of each verdict on each claim, by n.
-
-    docs/method/power.md#first-n
-
-    Parameters
-    ----------
-    sizes : sequence of int
-        Numbers of participants, none above those of the study.
-    seed : int
-        ≥ 0.
-    jobs : int, optional
-        Processes; as many as cores without it. No number of them changes the table.
-    dask : str, optional
-        Address of a scheduler.
-    effort : Effort, optional
-        Of the model of the participants, where it decides.
-    advance : callable, optional
-        Called after each simulation.
-    first : callable, optional
-        Called once, after `FIRST_ANSWER_S`, with the table so far and the estimated time left (s);
-        not called if all simulations are done by then.
-
-    Returns
-    -------
-    DataFrame
-        `tactileq.analysis.power.power.POWER_COLUMNS`.
-    """
-    from tactileq.analysis.power.power import power_table
-
-    work = partial(simulated_verdicts, people, sizes, seed=seed, effort=effort)
-    found: dict[int, list[Verdict]] = {}
-    began_s = first_s = monotonic()
-    sentence = False
-    with working(work, range(simulations), jobs=jobs, dask=dask) as done:
-        for number, one in done:
-            found[number] = one
-            advance("")
-            now_s, count = monotonic(), len(found)
-            if count == 1:
-                first_s = now_s  # before it, workers were begun
-            elif not sentence and count < simulations and now_s - began_s >= FIRST_ANSWER_S:
-                sentence = True
-                so_far = (one for each in found.values() for one in each)
-                left_s = (simulations - count) * (now_s - first_s) / (count - 1)
-                first(power_table(so_far, simulations=count), left_s)
-    in_order = (one for number in sorted(found) for one in found[number])
-    return power_table(in_order, simulations=simulations)
 
 
 def simulated_verdicts(

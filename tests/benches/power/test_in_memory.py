@@ -23,16 +23,16 @@ from tactileq.analysis.statistics.equivalence import (
 )
 from tactileq.analysis.statistics.participants.posterior import Effort
 from tactileq.analysis.statistics.verdicts import people_data
-from tactileq.benches.validation.procedures import cells, simulate_cell
-from tactileq.commands.study.power import planted_effects, sizes_of
-from tactileq.commands.study.power_in_memory import (
+from tactileq.benches.power.in_memory import (
     SimulatedStudy,
-    chances,
     people_of,
     planned_for,
     responses_of,
     simulated_verdicts,
 )
+from tactileq.benches.validation.procedures import cells, simulate_cell
+from tactileq.commands.study.chances import chances
+from tactileq.commands.study.power import planted_effects, sizes_of
 from tactileq.experiments.observers.in_memory import simulate_sessions
 from tactileq.experiments.observers.whole_study import simulate_study
 from tactileq.experiments.study.models import ModelSets
@@ -184,7 +184,7 @@ def test_a_first_answer_comes_before_all_simulations_are_done(
 ) -> None:
     who, sizes = people(study, models, most=6), (4, 6)
     heard: list[tuple[pd.DataFrame, float]] = []
-    monkeypatch.setattr("tactileq.commands.study.power_in_memory.FIRST_ANSWER_S", 0.0)
+    monkeypatch.setattr("tactileq.commands.study.chances.FIRST_ANSWER_S", 0.0)
 
     def run(simulations: int) -> pd.DataFrame:
         def hear(table: pd.DataFrame, left_s: float) -> None:
@@ -196,7 +196,7 @@ def test_a_first_answer_comes_before_all_simulations_are_done(
     ((table, left_s),) = heard
     pd.testing.assert_frame_equal(table, run(2))
     assert left_s > 0
-    monkeypatch.setattr("tactileq.commands.study.power_in_memory.FIRST_ANSWER_S", 3600.0)
+    monkeypatch.setattr("tactileq.commands.study.chances.FIRST_ANSWER_S", 3600.0)
     run(3)
     assert len(heard) == 1
 
