@@ -192,9 +192,10 @@ def load_model_sets(
     folder: str | Path,
     *,
     overriding: Mapping[str, Path] | None = None,
+    reads: Callable[..., None] = lambda *paths: None,
     progress: Callable[[float, str], None] = lambda share, texture: None,
-) -> tuple[ModelSets, list[Path]]:
-    """The sets of models of a study, and all that was read for them.
+) -> ModelSets:
+    """The sets of models of a study.
 
     Parameters
     ----------
@@ -202,6 +203,8 @@ def load_model_sets(
         What the study's paths are relative to: the folder of its file.
     overriding : mapping of set to path, optional
         Other places than the study's; relative to where the program runs.
+    reads : callable
+        Called with files and folders before they are read.
     progress : callable
         Called with the share that is done, and the last texture, when a scene is compiled.
 
@@ -214,16 +217,17 @@ def load_model_sets(
     given = dict(overriding or {})
     check_keys(given, tuple(study.models), where="the sets of models of the study")
     sets: dict[str, Mapping[str, Presentable]] = {}
-    files: list[Path] = []
     for name, stated in study.models.items():
         place = given.get(name, Path(folder) / stated)
         reference = next(iter(sets.values()), None)
+        reads(place)
         try:
-            sets[name], read = _models_at(place, reference, study, name=name, progress=progress)
+            if place.suffix == ".toml":
+                reads(*scene_files(place))
+            sets[name] = _models_at(place, reference, study, name=name, progress=progress)
         except InputError as error:
             raise InputError(f"models {name}: {error}") from None
-        files += read
-    return ModelSets(sets=sets), files
+    return ModelSets(sets=sets)
 
 
 def _models_at(
@@ -233,23 +237,22 @@ def _models_at(
     *,
     name: str,
     progress: Callable[[float, str], None],
-) -> tuple[Mapping[str, Presentable], list[Path]]:
+) -> Mapping[str, Presentable]:
     """The models of a folder or a scene, or the files of a stimulus set.
 
     Of a scene those that belong to the reference's; of a stimulus set those labelled as the set.
     """
     if (place / STIMULI).is_file():
-        found = stimuli_of_surfaces(place, label=name, textures=study.textures)
-        return found, [place]
+        return stimuli_of_surfaces(place, label=name, textures=study.textures)
     if place.suffix == ".toml" or (place / SCENE).is_file():
         full = _grids(reference)
-        return scene_models(place, full, progress=progress), [*scene_files(place)]
+        return scene_models(place, full, progress=progress)
     if not place.is_dir():
         raise InputError(
             f"expected a folder of models or a scene at {place}, got none; make it, or correct the "
             "place under [models]."
         )
-    return load_any_models(place), [place]
+    return load_any_models(place)
 
 
 def _grids(models: Mapping[str, Presentable] | None) -> Mapping[str, TextureModel] | None:

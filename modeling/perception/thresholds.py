@@ -168,7 +168,13 @@ class Threshold(FileSection):
     @staticmethod
     def named(name: str | Path) -> Threshold:
         """An included threshold, by name, or a user's own, by the path of its TSV."""
-        return Threshold.load(name) if Path(name).suffix else Threshold.shipped(str(name))
+        file = Threshold.file_of(name)
+        return Threshold.load(file) if file else Threshold.shipped(str(name))
+
+    @staticmethod
+    def file_of(name: str | Path) -> Path | None:
+        """The file of a user's own threshold; None for the name of an included one."""
+        return Path(name) if Path(name).suffix else None
 
     @staticmethod
     def shipped(name: str) -> Threshold:

@@ -23,6 +23,7 @@ from tests.experiments.verification.small_studies import (
     small_models,
     small_study,
 )
+from tests.opened import compared_with_provenance
 
 TEXTURES = ("canvas", "PVC")
 PAGE = Path(__file__).parents[2] / "docs/method/publishing.md"
@@ -69,10 +70,12 @@ def here(whole: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(whole, tmp_path, dirs_exist_ok=True))
 
 
-def test_an_archive_stands_alone(main, here: Path, tmp_path_factory) -> None:
+def test_an_archive_stands_alone(main, here: Path, tmp_path_factory, monkeypatch) -> None:
     assert main("analyze", "data", "--seed", "3", "--out", "results").returncode == 0
-    done = main("publish", "data", "--study", "study.toml", "--results", "results", "--out", "arch")
-    assert done.returncode == 0, done.stderr
+    words = ("publish", "data", "--study", "study.toml", "--results", "results", "--out", "arch")
+    with compared_with_provenance(here, monkeypatch, "arch/provenance.json"):
+        done = main(*words)
+        assert done.returncode == 0, done.stderr
     note = json.loads((here / "arch/provenance.json").read_text())
     assert f"seal of the archive: {note['seal']}" in done.stdout
     assert note["seal"] == seal_over(note["sha256"])

@@ -18,6 +18,7 @@ from tactileq.rig.recording.capture.grid import StrokeGrid
 from tactileq.rig.recording.capture.input import InputSettings
 from tactileq.rig.shared.setup.rig_file import SHIPPED_RIG_FILE, RigFile
 from tests.conftest import ENDED_WITH_US
+from tests.opened import compared_with_provenance
 from tests.rig.waiting import wait_until
 
 ROOT = Path(__file__).parents[2]
@@ -108,6 +109,7 @@ def test_a_recording_that_is_killed_goes_on_and_is_a_recording_set(
     assert 0.25 < record.samples.std() < 0.52
     note = json.loads((oak / "provenance.json").read_text())
     assert note["command"] == "tactileq record --audio"
+    assert list(note["inputs_sha256"]) == ["grid.toml"]
     assert note["settings"]["input"]["g_per_fullscale"] == 10
     assert set(note["input"]) == {
         *("clock_drift_ppm", "clock_jitter_ms", "lost_at_places", "rms_at_rest_g")
@@ -190,10 +192,11 @@ def test_a_rig_without_an_accelerometer_needs_g_per_full_scale(main, tmp_path: P
     assert "expected the hand in the rig file or on the command line, got both" in both.stderr
 
 
-def test_free_strokes_give_a_grid_to_record(main, tmp_path: Path) -> None:
+def test_free_strokes_give_a_grid_to_record(main, tmp_path: Path, monkeypatch) -> None:
     rig_file(tmp_path, accelerometer=False)
-    made = main("rig", "range", "--rig", "rig.toml", "--seconds", 6, "--forces", 1)
-    assert made.returncode == 0, made.stderr
+    with compared_with_provenance(tmp_path, monkeypatch):
+        made = main("rig", "range", "--rig", "rig.toml", "--seconds", 6, "--forces", 1)
+        assert made.returncode == 0, made.stderr
     grid = StrokeGrid.load(tmp_path / "grid.toml")
     assert grid.shape == (7, 1)
     # The 95th percentile of a sine of 150 mm/s is 149.5 mm/s.

@@ -11,15 +11,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tactileq.options import Out
-from tactileq.own_results import check_own_results
 from tactileq.printing import progress
+from tactileq.results import FolderResults
 from tactileq.workers import working
 
 if TYPE_CHECKING:
     from tactileq.benches.chart.chart import Chart
     from tactileq.benches.chart.surfaces import Origin
     from tactileq.benches.rendering.bench import RenderingBench
-    from tactileq.modeling.files.folders import Contents
 
 bench = typer.Typer(
     no_args_is_help=True,
@@ -93,9 +92,10 @@ def bench_chart(
     Example: tactileq bench chart --recordings recordings/cork --out chart
     """
     from tactileq.benches.chart.methods import chosen_methods
-    from tactileq.benches.chart.page import plotly_script
+    from tactileq.benches.chart.page import chart_files, plotly_script
 
-    seen = check_own_results(out, "bench chart")
+    results = FolderResults(out, "bench chart")
+    results.reads(*(recordings or []), *(toolkit or []), *(models or []))
     methods = chosen_methods(method or [], full=full)
     sources = chart_sources(recordings or [], toolkit or [], models or [], full=full)
     plotly_script()  # whether it is there is said before anything is charted
@@ -106,7 +106,9 @@ def bench_chart(
         "full": full,
         "machine": chart.machine,
     }
-    _write_chart(chart, out, seen=seen, settings=settings)
+    with results.folder(results.provenance(settings)) as fresh:
+        for name, data in chart_files(chart).items():
+            (fresh / name).write_bytes(data)
     for warning in chart.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     for comparison in chart.comparisons:
@@ -161,45 +163,31 @@ def charted(
     return chart_of([made[number] for number in sorted(made)])
 
 
-def _write_chart(chart: Chart, out: Path, *, seen: Contents, settings: dict[str, object]) -> None:
-    from tactileq.benches.chart.page import chart_files
-    from tactileq.modeling.files.folders import replace_folder
-    from tactileq.modeling.files.provenance import provenance_of, seal_folder
-
-    with replace_folder(out, seen) as fresh:
-        for name, data in chart_files(chart).items():
-            (fresh / name).write_bytes(data)
-        seal_folder(fresh, provenance_of("bench chart", settings))
-
-
 def bench_rendering_into(out: Path, *, quick: bool, plot: bool) -> None:
     """Time the renderer and its rivals; print and write the results."""
     from tactileq.analysis.columns import tsv_text
     from tactileq.analysis.page.saving import DOTS_PER_INCH
     from tactileq.benches.rendering.bench import QUICK, BenchEffort, bench_rendering
     from tactileq.benches.rendering.figure import figure_rendering
-    from tactileq.modeling.files.folders import replace_folder
-    from tactileq.modeling.files.provenance import provenance_of, seal_folder
     from tactileq.modeling.files.writing import write_text
 
-    seen = check_own_results(out, "bench render")
+    results = FolderResults(out, "bench render")
     effort = QUICK if quick else BenchEffort()
     with progress("Timing", effort.parts) as advance:
         timed = bench_rendering(effort, progress=advance)
-    with replace_folder(out, seen) as fresh:
+    settings = {
+        "quick": quick,
+        "machine": timed.machine,
+        "compiler": timed.compiler,
+        "memory_bytes": timed.memory_bytes,
+        "import_s": timed.import_s,
+    }
+    with results.folder(results.provenance(settings)) as fresh:
         tables = {"times": timed.times, "layers": timed.sweep, "aims": timed.aims}
         for name, table in {**tables, "operations": timed.operations}.items():
             write_text(fresh / f"{name}.tsv", tsv_text(table))
         if plot:
             figure_rendering(timed).savefig(fresh / "rendering.png", dpi=DOTS_PER_INCH)
-        settings = {
-            "quick": quick,
-            "machine": timed.machine,
-            "compiler": timed.compiler,
-            "memory_bytes": timed.memory_bytes,
-            "import_s": timed.import_s,
-        }
-        seal_folder(fresh, provenance_of("bench render", settings))
     _print_bench(timed)
     print(f"{int(timed.aims['met'].sum())} of {len(timed.aims)} targets met: {out / 'aims.tsv'}")
 

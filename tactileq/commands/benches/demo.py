@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,8 +16,8 @@ from tactileq.commands.models.stimuli import render_set
 from tactileq.commands.results.analyze import read_answers
 from tactileq.commands.study.simulate import run_study
 from tactileq.options import Out, Seed
-from tactileq.own_results import check_own_results
 from tactileq.printing import progress, share_of
+from tactileq.results import FolderResults
 from tactileq.workers import mapping
 
 if TYPE_CHECKING:
@@ -52,19 +52,18 @@ def demo(
         return
     from tactileq.experiments.study.study import Study
     from tactileq.modeling import Threshold
-    from tactileq.modeling.files.folders import replace_folder
-    from tactileq.modeling.files.provenance import provenance_of, seal_folder
     from tactileq.modeling.threads import one_linear_algebra_thread
     from tactileq.stimuli.planted.textures import TEXTURES
 
-    seen = check_own_results(out, "demo")
+    written = FolderResults(out, "demo")
+    provenance: dict[str, Any] = {}
     plan = Study.load()
     # Of the shipped tables the one by which most simulated textures have a layer to drop.
     threshold = Threshold.named("mobile")
     print("A study in silico: simulated surfaces, simulated participants, the real program.")
     # Every core has a process of its own to do.
     alone = one_linear_algebra_thread()
-    with replace_folder(out, seen) as fresh, mapping(jobs=JOBS) as mapped, alone:
+    with written.folder(provenance) as fresh, mapping(jobs=JOBS) as mapped, alone:
         record = partial(demo_texture, folder=fresh, threshold=threshold, seed=seed)
         with progress("Recording, modeling, simplifying", len(TEXTURES)) as advance:
             recorded, benches = mapped(record, TEXTURES), Benches.begun(mapped)
@@ -96,7 +95,7 @@ def demo(
             "study": plan.to_dict(),
             "planted": population.planted,
         }
-        provenance = provenance_of("demo", settings, seed=seed)
+        provenance |= written.provenance(settings, seed=seed)
         write_demo_report(
             fresh,
             results,
@@ -106,7 +105,6 @@ def demo(
             seed=seed,
             mapped=mapped,
         )
-        seal_folder(fresh, provenance)
     print((out / "report.html").resolve())
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tactileq.commands.benches.demo_benches import reported
 from tactileq.commands.benches.demo_parts import JOBS, demo_population, modelled, presented
 from tactileq.commands.results.analyze import read_answers
 from tactileq.commands.study.simulate import run_study
-from tactileq.own_results import check_own_results
 from tactileq.printing import progress, share_of
+from tactileq.results import FolderResults
 from tactileq.workers import mapping
 
 if TYPE_CHECKING:
@@ -37,14 +37,13 @@ def demo_on_devices(out: Path, seed: int, study: Study | None = None) -> None:
     from tactileq.benches.recorder.section import recorder_section
     from tactileq.benches.recorder.tables import near_table, records_of
     from tactileq.modeling import Threshold
-    from tactileq.modeling.files.folders import replace_folder
-    from tactileq.modeling.files.provenance import provenance_of, seal_folder
     from tactileq.modeling.files.writing import file_stem
     from tactileq.modeling.threads import one_linear_algebra_thread
     from tactileq.rig.desk.device_twin import DeviceTwin
     from tactileq.stimuli.planted.textures import PlantedSurface
 
-    seen = check_own_results(out, "demo --device")
+    written = FolderResults(out, "demo --device")
+    provenance: dict[str, Any] = {}
     plan, threshold = study or device_study(), Threshold.named("mobile")
     textures = plan.textures
     print(
@@ -52,7 +51,7 @@ def demo_on_devices(out: Path, seed: int, study: Study | None = None) -> None:
         "program."
     )
     with (
-        replace_folder(out, seen) as fresh,
+        written.folder(provenance) as fresh,
         mapping(jobs=JOBS) as mapped,
         one_linear_algebra_thread(),
     ):
@@ -81,7 +80,7 @@ def demo_on_devices(out: Path, seed: int, study: Study | None = None) -> None:
             "study": plan.to_dict(),
             "planted": population.planted,
         }
-        provenance = provenance_of("demo --device", settings, seed=seed)
+        provenance |= written.provenance(settings, seed=seed)
         responses = read_answers({"": fresh / "data"}, ())
         hand = load_hand(fresh / "data", responses.answers)
         near = near_table(
@@ -105,7 +104,6 @@ def demo_on_devices(out: Path, seed: int, study: Study | None = None) -> None:
                 progress=advance_share,
                 mapped=mapped,
             )
-        seal_folder(fresh, provenance)
     print((out / "report.html").resolve())
 
 

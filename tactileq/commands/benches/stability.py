@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tactileq.options import Out
-from tactileq.own_results import check_own_results
 from tactileq.printing import progress
+from tactileq.results import FolderResults
 from tactileq.workers import working
 
 if TYPE_CHECKING:
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     from tactileq.benches.atlas.case import Case
     from tactileq.benches.atlas.edges import Examined
-    from tactileq.modeling.files.folders import Contents
 
 
 def stability(
@@ -48,12 +47,12 @@ def stability(
     from tactileq.benches.atlas.cases import CASES
     from tactileq.benches.atlas.edges import columns_of
 
-    seen = check_own_results(out, "stability")
+    results = FolderResults(out, "stability")
     chosen = cases_of(CASES, only)
     with progress("Examining", len(columns_of(chosen, full=not reduced))) as advance:
         found = examined(chosen, full=not reduced, jobs=jobs, advance=advance)
     settings = {"reduced": reduced, "only": sorted({case.family for case in chosen})}
-    _write(found, out, seen=seen, settings=settings)
+    _write(found, results, settings)
 
 
 def cases_of(cases: Sequence[Case], families: Sequence[str] | None) -> list[Case]:
@@ -103,21 +102,16 @@ def examined(
     return [found[number] for number in sorted(found)]
 
 
-def _write(
-    found: Sequence[Examined], out: Path, *, seen: Contents, settings: dict[str, object]
-) -> None:
+def _write(found: Sequence[Examined], results: FolderResults, settings: dict[str, object]) -> None:
     from tactileq.benches.atlas.section import atlas_files
     from tactileq.benches.atlas.tables import margin_table
-    from tactileq.modeling.files.folders import replace_folder
-    from tactileq.modeling.files.provenance import provenance_of, seal_folder
 
-    provenance = provenance_of("stability", settings)
-    with replace_folder(out, seen) as fresh:
+    provenance = results.provenance(settings)
+    with results.folder(provenance) as fresh:
         for name, data in atlas_files(found, provenance).items():
             (fresh / name).write_bytes(data)
-        seal_folder(fresh, provenance)
     _print(margin_table(found))
-    print(f"simulated: {out / 'atlas.html'}")
+    print(f"simulated: {results.out / 'atlas.html'}")
 
 
 def _print(margins: pd.DataFrame) -> None:

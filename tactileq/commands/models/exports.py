@@ -11,8 +11,8 @@ import typer
 from tactileq.commands.models.stimuli import print_beyond_grid, recipe_from
 from tactileq.modeling.errors import counted
 from tactileq.options import ModelFile, Seed, VibratorFile
-from tactileq.own_results import note_of_file, write_own_files
 from tactileq.printing import simulated_note
+from tactileq.results import FileResults, Origin
 
 exports = typer.Typer(
     no_args_is_help=True,
@@ -128,16 +128,15 @@ def export_c_header(
     `limits` are those of `tactileq.Limits`, None for none.
     """
     from tactileq.modeling import Limits, Vibrator, compensation_for
-    from tactileq.modeling.files.hashes import sha256_of_paths
-    from tactileq.modeling.files.provenance import provenance_of
     from tactileq.modeling.files.writing import file_stem
     from tactileq.modeling.models.loading import load_model
     from tactileq.stimuli.exports.c_header import c_header
 
-    inputs = sha256_of_paths(path for path in (model_file, vibrator) if path is not None)
+    origin = Origin("export c")
+    origin.reads(model_file, vibrator)
     model = load_model(model_file)
     target = out or Path(f"{file_stem(name or model.texture)}.h")
-    note = note_of_file(target, "export c", texture=model.texture)
+    results = FileResults([target], "export c", texture=model.texture)
     rate_hz = model.rate_hz if rate_hz is None else rate_hz
     compensation, played_by = None, ""
     if vibrator is not None:
@@ -155,8 +154,7 @@ def export_c_header(
         compensation=compensation,
     )
     settings = {"name": name, "rate_hz": rate_hz, "single": single, "limits": dict(limits)}
-    provenance = provenance_of("export c", settings, seed=seed, inputs=inputs)
-    write_own_files({target: text.encode()}, note, provenance, texture=model.texture)
+    results.write({target: text.encode()}, origin.provenance(settings, seed=seed))
     print(f"{symbol}{simulated_note(model)}{played_by}: {target}")
 
 
@@ -172,16 +170,16 @@ def export_wav_file(
     vibrator: Path | None,
 ) -> None:
     """Write a model's vibration at one speed and force, with provenance; print its level."""
-    from tactileq.modeling.files.hashes import sha256_of_paths
-    from tactileq.modeling.files.provenance import provenance_of
     from tactileq.modeling.files.writing import file_stem
     from tactileq.modeling.models.loading import load_model
     from tactileq.stimuli.exports.wav import only_stimulus
     from tactileq.stimuli.sets.sources import load_sources
 
+    origin = Origin("export wav")
+    origin.reads(model_file, vibrator)
     model = load_model(model_file)
     target = out or Path(f"{file_stem(model.texture)}.wav")
-    note = note_of_file(target, "export wav", texture=model.texture)
+    results = FileResults([target], "export wav", texture=model.texture)
     recipe = recipe_from(
         [model_file],
         target,
@@ -192,12 +190,10 @@ def export_wav_file(
         seed=seed,
         vibrator=vibrator,
     )
-    inputs = sha256_of_paths(recipe.files())
     sources = load_sources(recipe)
     stimulus, data = only_stimulus(recipe, sources)
     settings = {"recipe": recipe.to_toml()}
-    provenance = provenance_of("export wav", settings, seed=seed, inputs=inputs)
-    write_own_files({target: data}, note, provenance, texture=model.texture)
+    results.write({target: data}, origin.provenance(settings, seed=seed))
     print_beyond_grid(sources)
     drive = "" if vibrator is None else ", as drive signal for the vibrator"
     simulated = " (simulated)" if stimulus.simulated == "true" else ""
@@ -213,21 +209,18 @@ def export_peq_json(
 ) -> None:
     """Write a model's equalizer at one condition or over its grid as JSON, with provenance."""
     from tactileq.modeling.files.documents import dump_json
-    from tactileq.modeling.files.hashes import sha256_of_paths
-    from tactileq.modeling.files.provenance import provenance_of
     from tactileq.modeling.files.writing import file_stem
     from tactileq.modeling.models.loading import load_model
     from tactileq.stimuli.exports.peq_json import peq_document
 
-    inputs = sha256_of_paths([model_file])
+    origin = Origin("export json")
+    origin.reads(model_file)
     model = load_model(model_file)
     target = out or Path(f"{file_stem(model.texture)}_peq.json")
-    note = note_of_file(target, "export json", texture=model.texture)
+    results = FileResults([target], "export json", texture=model.texture)
     document = peq_document(model, speed_mm_s=speed, force_n=force)
     count = len(document["conditions"])
     settings = {"speed_mm_s": speed, "force_n": force}
-    provenance = provenance_of("export json", settings, inputs=inputs)
-    contents = {target: dump_json(document).encode()}
-    write_own_files(contents, note, provenance, texture=model.texture)
+    results.write({target: dump_json(document).encode()}, origin.provenance(settings))
     conditions = counted(count, "condition")
     print(f"{conditions} of {model.texture}{simulated_note(model)}: {target}")

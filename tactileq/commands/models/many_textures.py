@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactileq.modeling.errors import counted
-from tactileq.own_results import check_own_files, write_own_files
 from tactileq.printing import (
     clipping_warnings,
     left_out_warnings,
@@ -18,6 +17,7 @@ from tactileq.printing import (
     sentence_of,
     simulated_note,
 )
+from tactileq.results import FileResults, Origin
 from tactileq.workers import working
 
 if TYPE_CHECKING:
@@ -115,14 +115,15 @@ def model_textures(
         Before any work where two textures would share a file, or other files are in the way.
     """
     sources, unreadable = _sources_in(folders)
-    _require_own_files(sources, out)
-    return [*unreadable, *_model_all(sources, out, how=how, jobs=jobs)]
+    places = _places_of(sources, out)
+    return [*unreadable, *_model_all(places, out, how=how, jobs=jobs)]
 
 
 def _model_all(
-    sources: Sequence[TextureSource], out: Path, *, how: HowToModel, jobs: int | None
+    places: Mapping[TextureSource, FileResults], out: Path, *, how: HowToModel, jobs: int | None
 ) -> list[TextureOutcome]:
     """Outcomes in the order of the sources, with a progress bar."""
+    sources = list(places)
     outcomes: dict[int, TextureOutcome] = {}
     work = partial(_model_one, out=out, how=how)
     with progress("Finding layers, fitting", len(sources)) as advance:
@@ -130,8 +131,7 @@ def _model_all(
             with working(work, sources, jobs=jobs) as results:
                 for number, made in results:
                     source = sources[number]
-                    start = _start(source, out)
-                    outcomes[number] = _write(made, start, texture=source.texture)
+                    outcomes[number] = _write(made, _start(source, out), places[source])
                     advance(source.texture)
         except BrokenExecutor:
             raise ValueError(
@@ -148,14 +148,13 @@ def _start(source: TextureSource, out: Path) -> Path:
     return out / file_stem(source.texture)
 
 
-def _write(made: _Made, start: Path, *, texture: str) -> TextureOutcome:
+def _write(made: _Made, start: Path, results: FileResults) -> TextureOutcome:
     """Write a texture's files, all or none; what is wrong becomes the outcome's error."""
     if made.outcome.error:
         return made.outcome
     contents = {Path(f"{start}{ending}"): data for ending, data in made.files.items()}
-    note = Path(f"{start}_provenance.json")
     try:
-        write_own_files(contents, note, made.provenance, texture=texture)
+        results.write(contents, made.provenance)
     except (ValueError, OSError) as error:
         return TextureOutcome(made.outcome.what, error=sentence_of(error))
     return made.outcome
@@ -164,8 +163,6 @@ def _write(made: _Made, start: Path, *, texture: str) -> TextureOutcome:
 def _model_one(source: TextureSource, *, out: Path, how: HowToModel) -> _Made:
     """Load and model one texture; what is wrong with it becomes its outcome's error."""
     from tactileq.analysis.spectra.findings import find_in, findings_files
-    from tactileq.modeling.files.hashes import sha256_of_paths
-    from tactileq.modeling.files.provenance import provenance_of
     from tactileq.modeling.recordings.recording_set import load_usable
     from tactileq.modeling.threads import one_linear_algebra_thread
 
@@ -173,7 +170,8 @@ def _model_one(source: TextureSource, *, out: Path, how: HowToModel) -> _Made:
     try:
         # One thread each: sums must not depend on the number of cores.
         with one_linear_algebra_thread():
-            inputs = sha256_of_paths([source.folder])
+            origin = Origin("model")
+            origin.reads(source.folder)
             records, unusable = load_usable(source.folder, texture=source.texture)
             found = find_in(
                 records,
@@ -190,7 +188,7 @@ def _model_one(source: TextureSource, *, out: Path, how: HowToModel) -> _Made:
                 "keep_hum": how.keep_hum,
                 "left_out": list(unusable),
             }
-            provenance = provenance_of("model", settings, inputs=inputs)
+            provenance = origin.provenance(settings)
     except (ValueError, OSError, MemoryError) as error:
         return _Made(TextureOutcome(what, error=sentence_of(error)))
     notes = (*_rate_notes(records), *_findings(found, _start(source, out), plot=how.plot))
@@ -320,11 +318,12 @@ def _sources_in(folders: Iterable[Path]) -> tuple[list[TextureSource], list[Text
     return sources, unreadable
 
 
-def _require_own_files(sources: Iterable[TextureSource], out: Path) -> None:
-    """Refuse textures whose files would overwrite each other's or another command's."""
+def _places_of(sources: Iterable[TextureSource], out: Path) -> dict[TextureSource, FileResults]:
+    """Where each texture's files go; refuses what would overwrite another's or a command's."""
     from tactileq.analysis.spectra.findings import FILE_ENDINGS
 
     taken: dict[Path, TextureSource] = {}
+    places = {}
     for source in sources:
         start = _start(source, out)
         if start in taken:
@@ -335,9 +334,10 @@ def _require_own_files(sources: Iterable[TextureSource], out: Path) -> None:
                 "rename one, or model them one by one with different --out."
             )
         taken[start] = source
-        check_own_files(
+        places[source] = FileResults(
             [Path(f"{start}{ending}") for ending in FILE_ENDINGS],
-            Path(f"{start}_provenance.json"),
-            command="model",
+            "model",
+            note=Path(f"{start}_provenance.json"),
             texture=source.texture,
         )
+    return places

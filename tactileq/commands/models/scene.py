@@ -9,8 +9,8 @@ import typer
 
 from tactileq.modeling.errors import counted
 from tactileq.options import Out, Seed
-from tactileq.own_results import check_own_results
 from tactileq.printing import progress, simulated_note
+from tactileq.results import FolderResults
 
 if TYPE_CHECKING:
     from tactileq.modeling import CompiledScene
@@ -47,16 +47,16 @@ def scene(
     """
     from tactileq.analysis.spectra.scene_files import scene_files
     from tactileq.modeling import Scene, compile_scene
-    from tactileq.modeling.files.folders import replace_folder
-    from tactileq.modeling.files.hashes import sha256_of_paths
-    from tactileq.modeling.files.provenance import provenance_of, seal_folder
     from tactileq.modeling.rendering.compiled import is_compiled
     from tactileq.modeling.scenes.loading import full_models
 
-    seen = check_own_results(out, "scene")
-    asked = Scene.load(scene_file)
-    inputs = sha256_of_paths([*asked.files, models or asked.models or Path("models")])
-    _, full = full_models(asked, models or asked.models or Path("models"))
+    results = FolderResults(out, "scene")
+    results.reads(scene_file)
+    results.reads(*Scene.load(scene_file).files)
+    asked = Scene.load(scene_file)  # what it names is read here, too
+    folder = models or asked.models or Path("models")
+    results.reads(folder)
+    _, full = full_models(asked, folder)
     with progress("Compiling the scene", len(asked.textures or full)) as advance:
         compiled = compile_scene(asked, full, progress=advance)
     settings = {
@@ -67,11 +67,10 @@ def scene(
     files = scene_files(compiled, seed=seed)
     if not any(name.endswith(".h") for name in files):
         print("note: no C header: models of different rates need a rate_hz under [actuator].")
-    with replace_folder(out, seen) as fresh:
+    with results.folder(results.provenance(settings, seed=seed)) as fresh:
         compiled.save(fresh)
         for name, data in files.items():
             (fresh / name).write_bytes(data)
-        seal_folder(fresh, provenance_of("scene", settings, seed=seed, inputs=inputs))
     for texture in compiled.textures:
         print_texture(texture)
         if is_compiled():

@@ -11,8 +11,8 @@ import typer
 
 from tactileq.modeling.errors import counted
 from tactileq.options import Criterion, HoldAbove, Margin, ModelFile, ThresholdName
-from tactileq.own_results import check_own_files, write_own_files
 from tactileq.printing import simulated_note, usable_recordings
+from tactileq.results import FileResults, Origin
 
 if TYPE_CHECKING:
     from tactileq.modeling import RecordingSet, Simplification, TextureModel
@@ -55,18 +55,16 @@ def simplify(
     from tactileq.analysis.textures.results import simplification_table
     from tactileq.modeling import TextureModel, Threshold
     from tactileq.modeling import simplify as drop_layers
-    from tactileq.modeling.files.hashes import sha256_of_paths
-    from tactileq.modeling.files.provenance import provenance_of
     from tactileq.modeling.files.writing import file_stem
 
-    inputs = sha256_of_paths([model_file])
+    origin = Origin("simplify")
+    origin.reads(model_file, Threshold.file_of(threshold), recordings if plot else None)
     full = TextureModel.load(model_file)
     start = out / file_stem(full.texture)
-    note = Path(f"{start}_provenance.json")
-    check_own_files(
+    results = FileResults(
         [Path(f"{start}{ending}") for ending in ENDINGS],
-        note,
-        command="simplify",
+        "simplify",
+        note=Path(f"{start}_provenance.json"),
         texture=full.texture,
         inputs=[model_file],
     )
@@ -98,8 +96,7 @@ def simplify(
     }
     settings |= {"full_sha256": full.sha256, "threshold_sha256": result.threshold.sha256}
     contents = {Path(f"{start}{ending}"): data for ending, data in files.items()}
-    provenance = provenance_of("simplify", settings, inputs=inputs)
-    write_own_files(contents, note, provenance, texture=full.texture)
+    results.write(contents, origin.provenance(settings))
     print_verdicts(result)
     if result.identical:
         print(

@@ -12,6 +12,7 @@ import typer
 from tactileq.modeling.errors import counted
 from tactileq.options import Out, VibratorFile
 from tactileq.printing import progress
+from tactileq.results import Origin
 
 if TYPE_CHECKING:
     from tactileq.stimuli.sets.recipe import Recipe
@@ -58,6 +59,8 @@ def stimuli(
 
     Example: tactileq stimuli models/*.json simplified/*.json --speed 150 --force 1.5
     """
+    origin = Origin("stimuli")
+    origin.reads(*(path for path in named if path.suffix.lower() == ".toml"), vibrator)
     recipe = recipe_from(
         named,
         out,
@@ -68,7 +71,7 @@ def stimuli(
         seed=seed,
         vibrator=vibrator,
     )
-    render_stimuli(recipe, out, inputs=[path for path in named if path.suffix == ".toml"])
+    render_stimuli(recipe, out, origin)
 
 
 def recipe_from(
@@ -120,17 +123,18 @@ def print_passed_over(others: Sequence[Path]) -> None:
         print(f"note: {path} states that it is not a model and is skipped.")
 
 
-def render_stimuli(recipe: Recipe, out: Path, *, inputs: Sequence[Path] = ()) -> None:
+def render_stimuli(recipe: Recipe, out: Path, origin: Origin) -> None:
     """Write a stimulus set with its contact sheet and provenance; report what exceeds the grid."""
-    from tactileq.modeling.files.hashes import sha256_of_paths
-    from tactileq.modeling.files.provenance import write_provenance
+    from tactileq.modeling.files.provenance import PROVENANCE_NAME, provenance_text
+    from tactileq.modeling.files.writing import write_text
     from tactileq.stimuli.sets.sources import files_behind
 
-    hashes = sha256_of_paths([*inputs, *files_behind(recipe)])
+    origin.reads(*recipe.files())
+    origin.reads(*files_behind(recipe))
 
     def print_origin(folder: Path) -> None:
-        settings = {"recipe": recipe.to_toml()}
-        write_provenance(folder / "provenance.json", "stimuli", settings, inputs=hashes)
+        text = provenance_text(origin.provenance({"recipe": recipe.to_toml()}))
+        write_text(folder / PROVENANCE_NAME, text)
 
     sources, count = render_set(recipe, out, finish=print_origin)
     print_passed_over(sources.passed_over)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactileq.own_results import note_of_file, write_own_files
+from tactileq.results import FileResults, Origin
 
 if TYPE_CHECKING:
     from tactileq.analysis.spectra.vibrator import CompensatedVibrator
@@ -58,16 +58,15 @@ def identify_from(test: Path, out: Path, *, plot: Path | None, simulated: bool) 
     from tactileq.analysis.spectra.figures.vibrator import figure_vibrator
     from tactileq.analysis.spectra.vibrator import compensated
     from tactileq.modeling import identify_vibrator
-    from tactileq.modeling.files.hashes import sha256_of_paths
-    from tactileq.modeling.files.provenance import provenance_of
     from tactileq.modeling.files.wav import read_wav_channels
 
     files = {path: ending for path, ending in ((out, ".json"), (plot, ".png")) if path is not None}
     for path, ending in files.items():
         if path.suffix.lower() != ending:
             raise ValueError(f"expected a name that ends in {ending}, got {path}; rename it.")
-    notes = {path: note_of_file(path, "vibrator") for path in files}
-    inputs = sha256_of_paths([test])
+    results = {path: FileResults([path], "vibrator") for path in files}
+    origin = Origin("vibrator")
+    origin.reads(test)
     samples, rate_hz = read_wav_channels(test)
     if samples.shape[1] != 2:
         raise ValueError(
@@ -81,9 +80,9 @@ def identify_from(test: Path, out: Path, *, plot: Path | None, simulated: bool) 
     contents = {out: shown.vibrator.to_json().encode()}
     if plot is not None:
         contents[plot] = picture_bytes(figure_vibrator(shown))
-    provenance = provenance_of("vibrator", {"simulated": simulated}, inputs=inputs)
+    provenance = origin.provenance({"simulated": simulated})
     for path, data in contents.items():
-        write_own_files({path: data}, notes[path], provenance)
+        results[path].write({path: data}, provenance)
     print(f"{_found(shown)}: {out}")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -14,6 +14,7 @@ from tactileq.commands.recording.imports import imports_before
 from tactileq.commands.recording.map import recording_map
 from tactileq.commands.recording.more import NOTHING_MORE, further_conditions
 from tactileq.modeling.errors import counted
+from tactileq.results import Origin
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -150,6 +151,8 @@ def record_by_hand(folder: Path, options: HandRecording) -> None:
             f"expected --more or --grid, got both ({options.grid}); leave out --grid, since --more "
             "takes its conditions from the recordings, or leave out --more."
         )
+    origin = Origin("record --audio")
+    origin.reads(options.rig, options.grid)
     rig = rig_from(options.rig)
     hand, heard = hand_from(rig, options.hand), input_from(rig, options.input)
     if options.more:
@@ -165,7 +168,7 @@ def record_by_hand(folder: Path, options: HandRecording) -> None:
         check_assumed_force(grid, hand.assumed_force_n)
     if rig is not None and options.input.g_per_fullscale is None:
         print_assumed(rig)
-    record_on(grid, folder, options, rig=rig, hand=hand, heard=heard)
+    record_on(grid, folder, options, rig=rig, hand=hand, heard=heard, origin=origin)
 
 
 def record_on(
@@ -176,6 +179,7 @@ def record_on(
     rig: RigFile | None,
     hand: HandSettings,
     heard: InputSettings,
+    origin: Origin,
 ) -> None:
     """Open the devices, and record until the grid is full."""
     from tactileq.rig.desk.lock import rig_locked
@@ -195,34 +199,24 @@ def record_on(
             repeat=options.repeat,
             simulated=options.input.simulated or (rig is not None and rig.simulated),
         )
-        provenance = provenance_of_run(
-            folder,
-            options,
-            plan,
-            settings={
-                "hand": asdict(hand),
-                "input": asdict(heard),
-                "device": source.device_name,
-            },
+        settings = settings_of_run(
+            folder, plan, hand=asdict(hand), input=asdict(heard), device=source.device_name
         )
         recorder = StrokeRecorder(
             source,
             since_now(live),
-            store=PieceStore(folder, plan, provenance=provenance),
+            store=PieceStore(folder, plan, provenance=origin.provenance(settings)),
             g_per_fullscale=heard.g_per_fullscale,
             speed_delay_s=hand.filter_delay_s,
         )
         run(recorder, reader.faults)
 
 
-def provenance_of_run(
-    folder: Path, options: HandRecording, plan: Plan, *, settings: Mapping[str, Any]
-) -> dict[str, Any]:
-    """What the recordings of this run came from, with what made those before them."""
-    from tactileq.modeling.files.hashes import sha256_of_paths
-    from tactileq.modeling.files.provenance import PROVENANCE_NAME, provenance_of
+def settings_of_run(folder: Path, plan: Plan, **settings: Any) -> dict[str, Any]:
+    """What the recordings of this run are made by, with what made those before them."""
+    from tactileq.modeling.files.provenance import PROVENANCE_NAME
 
-    every = {
+    return {
         "texture": plan.texture,
         "grid": plan.grid.to_dict(),
         "rate_hz": plan.rate_hz,
@@ -232,8 +226,6 @@ def provenance_of_run(
         **settings,
         "added to": imports_before(folder / PROVENANCE_NAME),
     }
-    files = [path for path in (options.rig, options.grid) if path is not None]
-    return provenance_of("record --audio", every, inputs=sha256_of_paths(files))
 
 
 def print_assumed(rig: RigFile) -> None:

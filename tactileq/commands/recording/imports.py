@@ -14,6 +14,7 @@ import typer
 from tactileq.modeling.errors import counted, shown
 from tactileq.options import Out, Seed
 from tactileq.printing import clipping_warnings, progress
+from tactileq.results import Origin
 
 if TYPE_CHECKING:
     from tactileq.modeling import RecordingSet
@@ -68,17 +69,15 @@ def import_wav(
 
     Example: tactileq import wav *.wav --labels labels.tsv --texture oak --g-per-fullscale 16
     """
-    from tactileq.modeling.files.hashes import sha256_of_paths
     from tactileq.rig.recording.importing.files import import_wav_file, usable
 
-    inputs = sha256_of_paths(files)
+    origin = Origin("import wav")
+    origin.reads(*files, labels)
     named = labels_of(files, labels, texture=texture or out.name, speed=speed, force=force)
     read = partial(import_wav_file, g_per_fullscale=g_per_fullscale, channel=channel)
     records, refused = usable(read, files, named)
     settings = {"g_per_fullscale": g_per_fullscale, "channel": channel, "labels": str(labels)}
-    add_to_set(
-        out, records, "import wav", settings=settings, inputs=inputs, left_out=refused, yes=yes
-    )
+    add_to_set(out, records, origin, settings=settings, left_out=refused, yes=yes)
 
 
 @imports.command("csv")
@@ -121,7 +120,6 @@ def import_csv(
 
     Example: tactileq import csv *.csv --labels labels.tsv --map time=Zeit,z=Kanal_1 --mv-per-g 100
     """
-    from tactileq.modeling.files.hashes import sha256_of_paths
     from tactileq.rig.recording.importing.csv_columns import parse_columns
     from tactileq.rig.recording.importing.files import import_csv_file, usable
 
@@ -134,7 +132,8 @@ def import_csv(
             )
         role_of["time"] = time_column
 
-    inputs = sha256_of_paths(files)
+    origin = Origin("import csv")
+    origin.reads(*files, labels)
     named = labels_of(files, labels, texture=texture or out.name, speed=speed, force=force)
     read = partial(
         import_csv_file, axis=axis, unit=unit, rate_hz=rate_hz, mv_per_g=mv_per_g, named=role_of
@@ -148,9 +147,7 @@ def import_csv(
         "columns": role_of,
         "labels": str(labels),
     }
-    add_to_set(
-        out, records, "import csv", settings=settings, inputs=inputs, left_out=refused, yes=yes
-    )
+    add_to_set(out, records, origin, settings=settings, left_out=refused, yes=yes)
 
 
 @imports.command("hatt")
@@ -185,7 +182,6 @@ def import_hatt(
 
     Example: tactileq import hatt "Models_Canvas 1.xml" --speed 100 --speed 200 --force 1 --force 2
     """
-    from tactileq.modeling.files.hashes import sha256_of_paths
     from tactileq.rig.recording.importing.files import Imported
     from tactileq.rig.recording.importing.hatt_grid import spanning_grid
     from tactileq.rig.recording.importing.hatt_reader import load_hatt
@@ -196,7 +192,8 @@ def import_hatt(
             "expected the grid of --speed and --force or --own-conditions, got both; leave one out."
         )
     files = [file for given in files for file in models_of_the_toolkit(given)]
-    inputs = sha256_of_paths(files)
+    origin = Origin("import hatt")
+    origin.reads(*files)
     textures = [load_hatt(file) for file in files]
     check_one_file_each(files, [texture.material for texture in textures])
     grids = [
@@ -229,7 +226,7 @@ def import_hatt(
         "duration_s": duration_s,
         "seed": seed,
     }
-    add_to_set(out, records, "import hatt", settings=settings, inputs=inputs, yes=yes)
+    add_to_set(out, records, origin, settings=settings, yes=yes)
     print_conditions(made, grids)
 
 
@@ -311,29 +308,27 @@ def _first_of(names: Sequence[str]) -> str:
 def add_to_set(
     out: Path,
     new: Sequence[Imported],
-    command: str,
+    origin: Origin,
     *,
     settings: Mapping[str, object],
-    inputs: Mapping[str, str],
     left_out: Sequence[str] = (),
     yes: bool = False,
 ) -> None:
     """Add imported recordings to those that `out` already holds.
 
-    `inputs`: the hashes of the files that were read. `left_out`: a sentence for each file that
-    could not be used. Implausible values are refused or, if `yes`, warned about and written into
-    the provenance.
+    `origin`: what was read. `left_out`: a sentence for each file that could not be used.
+    Implausible values are refused or, if `yes`, warned about and written into the provenance.
     """
     from tactileq.modeling import RecordingSet
     from tactileq.modeling.files.places import locked
-    from tactileq.modeling.files.provenance import PROVENANCE_NAME, provenance_of, provenance_text
+    from tactileq.modeling.files.provenance import PROVENANCE_NAME, provenance_text
     from tactileq.modeling.recordings.appending import staged
 
     doubts = [doubt for one in new for doubt in one.doubts]
     if doubts and not yes:
         raise ValueError(several(doubts))
     records = RecordingSet(one.recording for one in new)
-    names = [Path(path).name for path in inputs]
+    names = [Path(path).name for path in origin.inputs]
     for sentence in (
         *alike([f"warning: imported anyway: {doubt}" for doubt in doubts], names),
         *alike(clipping_warnings(records), names),
@@ -341,13 +336,13 @@ def add_to_set(
         *alike([f"warning: left out: {sentence}" for sentence in left_out], names),
     ):
         print(sentence, file=sys.stderr)
-    provenance = out / PROVENANCE_NAME
+    note = out / PROVENANCE_NAME
     taken = {"doubts": doubts} if doubts else {}
-    origin = provenance_of(command, {**settings, **taken}, inputs=inputs)
+    provenance = origin.provenance({**settings, **taken})
     # Only quick work is done under the lock, while another import into the same set has to wait.
     with staged(out, records, [one.source for one in new]) as ready, locked(out):
-        origin["settings"]["added to"] = imports_before(provenance)
-        count = ready.add({PROVENANCE_NAME: provenance_text(origin).encode()})
+        provenance["settings"]["added to"] = imports_before(note)
+        count = ready.add({PROVENANCE_NAME: provenance_text(provenance).encode()})
     if any(record.unit == "arbitrary" for record in records):
         print(
             "note: the unit is arbitrary, so models cannot be simplified; give --g-per-fullscale "

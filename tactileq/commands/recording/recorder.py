@@ -9,10 +9,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactileq.commands.recording.imports import imports_before
+from tactileq.commands.recording.audio import settings_of_run
 from tactileq.commands.recording.more import NOTHING_MORE, further_conditions
 from tactileq.modeling.errors import InputError, counted
 from tactileq.printing import progress
+from tactileq.results import Origin
 
 if TYPE_CHECKING:
     from tactileq.modeling.arrays import Floats
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from tactileq.rig.machines.recorder.sensors import Sensor
     from tactileq.rig.recording.capture.grid import StrokeGrid
 
+COMMAND = "record --recorder"
 MOST_REFUSED = 3
 
 
@@ -49,6 +51,8 @@ def record_on_recorder(folder: Path, recorder: str, options: RecorderRecording) 
     )
 
     path = SHIPPED_RECORDER_FILE if recorder == IN_VIRTUAL_TIME else Path(recorder)
+    origin = Origin(COMMAND)
+    origin.reads(path, options.grid)
     file = RecorderFile.load(path)
     grid = _grid(folder, options)
     if grid is None:
@@ -71,7 +75,10 @@ def record_on_recorder(folder: Path, recorder: str, options: RecorderRecording) 
                 f"{file.path}, or correct the address."
             )
         with _sensor(file, device, options) as sensor:
-            _tell(_plan_run(folder, grid, options, file=file, device=device, sensor=sensor))
+            run = _plan_run(
+                folder, grid, options, file=file, device=device, sensor=sensor, origin=origin
+            )
+            _tell(run)
 
 
 def record_quietly(folder: Path, options: RecorderRecording) -> None:
@@ -85,12 +92,16 @@ def record_quietly(folder: Path, options: RecorderRecording) -> None:
     from tactileq.rig.machines.recorder.driver import Recorder
     from tactileq.rig.machines.recorder.recorder_file import SHIPPED_RECORDER_FILE, RecorderFile
 
+    origin = Origin(COMMAND)
+    origin.reads(SHIPPED_RECORDER_FILE, options.grid)
     file = RecorderFile.load(SHIPPED_RECORDER_FILE)
     grid = _grid(folder, options)
     assert grid is not None
     device = Recorder(_virtual(options), file.law())
     with _sensor(file, device, options) as sensor:
-        run = _plan_run(folder, grid, options, file=file, device=device, sensor=sensor)
+        run = _plan_run(
+            folder, grid, options, file=file, device=device, sensor=sensor, origin=origin
+        )
         run.run()
     if run.refused:
         raise InputError(run.refused[0])
@@ -238,6 +249,7 @@ def _plan_run(
     file: RecorderFile,
     device: Recorder,
     sensor: Sensor,
+    origin: Origin,
 ) -> PlanRun:
     """What is still to be recorded into the folder."""
     from tactileq.rig.machines.recorder.recording import PlanRun
@@ -252,11 +264,12 @@ def _plan_run(
         repeat=options.repeat,
         simulated=file.simulated,
     )
+    settings = settings_of_run(folder, plan, recorder=file.recorder.name, law=asdict(file.law()))
     store = RecorderStore(
         folder,
         plan,
         radius_mm=file.sample.radius.value,
-        provenance=_provenance(folder, options, plan, file),
+        provenance=origin.provenance(settings, seed=options.seed if file.simulated else None),
     )
     return PlanRun(device, sensor, store, file.sample.run_in_s, tell=_say)
 
@@ -289,25 +302,3 @@ def _tell(run: PlanRun) -> None:
             f"expected all conditions to be held, got {len(run.refused)} refused; mend what the "
             "warnings say, then run the command again to continue."
         )
-
-
-def _provenance(
-    folder: Path, options: RecorderRecording, plan: Any, file: RecorderFile
-) -> dict[str, Any]:
-    from tactileq.modeling.files.hashes import sha256_of_paths
-    from tactileq.modeling.files.provenance import PROVENANCE_NAME, provenance_of
-
-    settings = {
-        "texture": plan.texture,
-        "grid": plan.grid.to_dict(),
-        "rate_hz": plan.rate_hz,
-        "duration_s": plan.wanted_s,
-        "repeat": plan.repeat,
-        "simulated": plan.simulated,
-        "recorder": file.recorder.name,
-        "law": asdict(file.law()),
-        "added to": imports_before(folder / PROVENANCE_NAME),
-    }
-    files = [path for path in (file.path, options.grid) if path is not None]
-    seed = options.seed if file.simulated else None
-    return provenance_of("record --recorder", settings, inputs=sha256_of_paths(files), seed=seed)

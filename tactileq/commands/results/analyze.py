@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tactileq.options import Out, Seed
-from tactileq.own_results import check_own_results
 from tactileq.printing import progress, share_of, usable_recordings
+from tactileq.results import FolderResults
 from tactileq.workers import working
 
 if TYPE_CHECKING:
@@ -121,14 +121,12 @@ def analyze(
     from tactileq.analysis.report.report import write_report
     from tactileq.analysis.statistics.described_verdicts import check_complete
     from tactileq.benches.validation.section import validation_section
-    from tactileq.modeling.files.folders import replace_folder
-    from tactileq.modeling.files.hashes import sha256_of_paths
-    from tactileq.modeling.files.provenance import provenance_of, seal_folder
     from tactileq.modeling.models.loading import load_models
     from tactileq.modeling.perception.verdicts import load_simplifications
 
-    seen = check_own_results(out, "analyze")
+    written = FolderResults(out, "analyze")
     places = _places(data)
+    written.reads(*places.values(), *folders, plan)
     given = {"recordings": recordings, "models": models, "simplified": simplified, "plan": plan}
     options = {
         "data": list(data),
@@ -139,7 +137,6 @@ def analyze(
         "unverified": unverified,
         "seed": seed,
     }
-    inputs = sha256_of_paths(path for path in (*places.values(), *folders) if path is not None)
     responses = read_answers(places, exclude or (), unverified=unverified)
     if plan is not None:
         responses = replace(responses, plan=_later_plan(plan, responses.plan))
@@ -162,10 +159,11 @@ def analyze(
     appendix = []
     if validate is not None:
         appendix = [validation_section(*validated(validate, seed=seed, jobs=jobs, dask=dask))]
-    with replace_folder(out, seen) as fresh, share_of("Reporting") as advance:
-        settings = settings_of(responses, results)
-        settings |= {"validate": validate} if validate is not None else {}
-        provenance = provenance_of("analyze", settings, seed=seed, inputs=inputs)
+    settings = settings_of(responses, results)
+    settings |= {"validate": validate} if validate is not None else {}
+    provenance = written.provenance(settings, seed=seed)
+    sealed = {**provenance, "options": options}
+    with written.folder(sealed) as fresh, share_of("Reporting") as advance:
         write_report(
             fresh / "report.html",
             responses=responses,
@@ -176,7 +174,6 @@ def analyze(
             seed=seed,
             progress=advance,
         )
-        seal_folder(fresh, {**provenance, "options": options})
     for warning in responses.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     print((out / "report.html").resolve())
@@ -189,20 +186,17 @@ def analyze_tables(files: Sequence[Path], columns: str, *, out: Path, seed: int)
     from tactileq.analysis.answers.imported import load_imported, parse_map
     from tactileq.analysis.chapters.tables.section import table_sections
     from tactileq.analysis.report.report import write_report
-    from tactileq.modeling.files.folders import replace_folder
-    from tactileq.modeling.files.hashes import sha256_of_paths
-    from tactileq.modeling.files.provenance import provenance_of, seal_folder
 
     folders = [path for path in files if path.is_dir()]
     if not files or folders:
         got = f"the folder {folders[0]}" if folders else "none"
         raise ValueError(f"expected files of answers with --table, got {got}; give files only.")
-    seen = check_own_results(out, "analyze")
-    inputs = sha256_of_paths(files)
+    written = FolderResults(out, "analyze")
+    written.reads(*files)
     imported = load_imported(files, parse_map(columns))
     sections = table_sections(imported, rng=np.random.default_rng(seed))
-    with replace_folder(out, seen) as fresh, share_of("Reporting") as advance:
-        provenance = provenance_of("analyze", {"map": columns}, seed=seed, inputs=inputs)
+    provenance = written.provenance({"map": columns}, seed=seed)
+    with written.folder(provenance) as fresh, share_of("Reporting") as advance:
         write_report(
             fresh / "report.html",
             benches=sections,
@@ -211,7 +205,6 @@ def analyze_tables(files: Sequence[Path], columns: str, *, out: Path, seed: int)
             seed=seed,
             progress=advance,
         )
-        seal_folder(fresh, provenance)
     print((out / "report.html").resolve())
 
 

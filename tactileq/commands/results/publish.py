@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tactileq.own_results import check_own_results
+from tactileq.results import FolderResults
 
 _WITH_MODELS = ("recordings", "models", "simplified")
 
@@ -53,17 +53,19 @@ def publish(
     from tactileq.experiments.study.study import Study
     from tactileq.modeling import InputError
     from tactileq.modeling.errors import counted
-    from tactileq.modeling.files.folders import replace_folder
-    from tactileq.modeling.files.hashes import seal_over, sha256_of_paths
-    from tactileq.modeling.files.provenance import provenance_of, seal_folder, sha256_of_files
+    from tactileq.modeling.files.hashes import seal_over
+    from tactileq.modeling.files.provenance import sha256_of_files
 
-    seen = check_own_results(out, COMMAND)
+    written = FolderResults(out, COMMAND)
+    given = {"data": data, "study": study, "results": results, "stimuli": stimuli}
+    written.reads(*given.values())
     stated = Study.load(study)
     found = require_verified(data, without=(), unverified=None)
     if not found.manifests:
         raise InputError(f"expected sessions in {data}, got none; name a folder with sourcedata.")
     places, absent = checked_models(found.manifests, _places(models), without=without or ())
     check_publishable(stated, models=places)
+    given |= {f"{name} models": place for name, place in places.items()}
     ran = Study.from_dict(found.manifests[0].study)
     if ran.sha256 != stated.sha256:
         raise InputError(
@@ -71,6 +73,8 @@ def publish(
             "own file, or change only [publication]."
         )
     options = _options_of(results, data) if results is not None else {}
+    given |= {name: Path(options[name]) for name in _WITH_MODELS if options.get(name)}
+    written.reads(*given.values())
     if without and options.get("models"):
         options |= dict.fromkeys(_WITH_MODELS)
         print("note: the report is made without the chapters on models, which are left out.")
@@ -83,8 +87,8 @@ def publish(
         free_text=free_text,
         simulated=found.manifests[0].simulated_participant,
     )
-    (inputs,) = sha256_of_paths([data]).values()
-    with replace_folder(out, seen) as fresh:
+    provenance: dict[str, Any] = {}
+    with written.folder(provenance) as fresh:
         told = assemble(fresh, publication, analyze=analyze)
         if errors := [i for i in bids_issues(fresh / DATA) if i["severity"] == "error"]:
             more = f" (and {counted(len(errors) - 1, 'more error')})" if errors[1:] else ""
@@ -92,10 +96,12 @@ def publish(
                 f"expected data that are valid BIDS, got {said_of(errors[0])}{more}; "
                 f"tactileq study validate {data} says more."
             )
+        # Paths would name a machine.
+        hashes = {name: written.inputs.get(str(path)) for name, path in given.items()}
+        written.inputs = {name: sha256 for name, sha256 in hashes.items() if sha256}
         settings = {"free_text": free_text, "without": list(without or ())}
-        provenance = provenance_of(COMMAND, settings, inputs={"data": inputs})
         seal = seal_over(sha256_of_files(fresh))
-        seal_folder(fresh, {**provenance, **told, "seal": seal})
+        provenance |= {**written.provenance(settings), **told, "seal": seal}
     for name in absent:
         print(f"note: the {name} models are not here, and not in the archive.")
     print(f"seal of the archive: {seal}")

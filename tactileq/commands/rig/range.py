@@ -16,8 +16,8 @@ from tactileq.commands.recording.audio import (
 )
 from tactileq.modeling.errors import counted
 from tactileq.options import AssumedForce, CountsPerMm, HandDevice, HandKind, OptionalRigPath, Out
-from tactileq.own_results import note_of_file, write_own_files
 from tactileq.printing import share_of
+from tactileq.results import FileResults
 
 if TYPE_CHECKING:
     from tactileq.modeling.arrays import Floats
@@ -49,22 +49,16 @@ def rig_range(
 
     Example: tactileq rig range --rig rig.toml --seconds 30 --out grid.toml
     """
-    from tactileq.modeling.files.hashes import sha256_of_paths
-    from tactileq.modeling.files.provenance import provenance_of
     from tactileq.rig.recording.capture.exploration import explored, grid_for, grid_text
 
-    note = note_of_file(out, COMMAND)
-    inputs = sha256_of_paths([] if rig is None else [rig])
+    results = FileResults([out], COMMAND)
+    results.reads(rig)
     settings = hand_from(rig_from(rig), HandOptions(hand, hand_device, counts_per_mm, force))
     found = explored(watched(settings, seconds))
     grid = grid_for(found, speeds=speeds, forces=forces)
     print(picture(found, grid))
-    origin = provenance_of(
-        COMMAND,
-        {"hand": asdict(settings), "seconds": seconds, **found.to_dict()},
-        inputs=inputs,
-    )
-    write_own_files({out: grid_text(grid, found).encode()}, note, origin)
+    origin = results.provenance({"hand": asdict(settings), "seconds": seconds, **found.to_dict()})
+    results.write({out: grid_text(grid, found).encode()}, origin)
     for note_on in notes_on(found, grid):
         print(note_on)
     speeds_of, forces_of = counted(grid.shape[0], "speed"), counted(grid.shape[1], "force")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,7 @@ def study_check(path: StudyArgument) -> None:
 
     Example: tactileq study check study.toml
     """
-    plan, sets, _ = loaded(path)
+    plan, sets = loaded(path)
     textures = counted(len(plan.textures), "texture")
     print(f"study: {plan.name}, {textures}, SHA-256 {plan.sha256[:12]}…")
     places = ", ".join(f"{name} ({place})" for name, place in plan.models.items())
@@ -30,8 +31,8 @@ def study_check(path: StudyArgument) -> None:
     _print_claims(plan)
 
 
-def loaded(path: Path) -> tuple[Study, ModelSets, list[Path]]:
-    """A study, its models and all that was read for both.
+def loaded(path: Path, reads: Callable[..., None] = lambda *paths: None) -> tuple[Study, ModelSets]:
+    """A study and its models; `reads` is called with what is read, before it is.
 
     Raises
     ------
@@ -42,15 +43,16 @@ def loaded(path: Path) -> tuple[Study, ModelSets, list[Path]]:
     from tactileq.experiments.study.models import load_model_sets
     from tactileq.experiments.study.study import Study
 
+    reads(path)
     plan = Study.load(path)
     require_texts(plan)
     if any(place.endswith(".toml") for place in plan.models.values()):
         with share_of("Compiling the scene") as advance:
-            sets, files = load_model_sets(plan, path.parent, progress=advance)
+            sets = load_model_sets(plan, path.parent, reads=reads, progress=advance)
     else:
-        sets, files = load_model_sets(plan, path.parent)
+        sets = load_model_sets(plan, path.parent, reads=reads)
     sets.require(plan)
-    return plan, sets, [path, *files]
+    return plan, sets
 
 
 def _print_claims(plan: Study) -> None:

@@ -9,7 +9,7 @@ import typer
 
 from tactileq.commands.study.check import loaded
 from tactileq.options import StudyArgument
-from tactileq.own_results import note_of_file, write_own_files
+from tactileq.results import FileResults
 
 
 def study_plan(
@@ -26,15 +26,12 @@ def study_plan(
     """
     from tactileq.experiments.study.study import plan_sha256
     from tactileq.experiments.tasks.page import plan_page
-    from tactileq.modeling.files.hashes import sha256_of_paths
-    from tactileq.modeling.files.provenance import provenance_of
 
     if out.suffix.lower() != ".md":
         raise ValueError(f"expected a name that ends in .md, got {out}; rename it.")
-    note = note_of_file(out, "study plan")
-    plan, sets, files = loaded(path)
+    results = FileResults([out], "study plan")
+    plan, sets = loaded(path, results.reads)
     sha256 = plan_sha256(plan, sets.sha256(plan.textures))
     settings = {"study_sha256": plan.sha256, "plan_sha256": sha256}
-    provenance = provenance_of("study plan", settings, inputs=sha256_of_paths(files))
-    write_own_files({out: plan_page(plan, sets).encode()}, note, provenance)
+    results.write({out: plan_page(plan, sets).encode()}, results.provenance(settings))
     print(f"plan {sha256[:12]}…: {out}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,14 +20,13 @@ from tactileq.options import (
     StudyArgument,
     ThresholdName,
 )
-from tactileq.own_results import check_own_results
 from tactileq.printing import print_models, progress
+from tactileq.results import FolderResults
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from tactileq.experiments.study.study import Study
-    from tactileq.modeling.files.folders import Contents
 
 PICTURE_DPI = 150
 
@@ -77,17 +76,19 @@ def power(
     """
     from tactileq.benches.power.in_memory import people_of, planned_for
     from tactileq.experiments.study.study import Study
-    from tactileq.modeling.files.hashes import sha256_of_paths
+    from tactileq.modeling import Threshold
 
-    seen = check_own_results(out, "power")
-    inputs = sha256_of_paths([study])
+    results = FolderResults(out, "power")
+    results.reads(study, Threshold.file_of(threshold))
     plan = Study.load(study)
     sizes = sizes_of(subjects)
     largest = planned_for(plan, sizes)
     planted = planted_effects(effect or (), plan.textures)
     people = people_of(
         largest,
-        models_of_study(plan, study, models=models, simplified=simplified, scene=scene)[0],
+        models_of_study(
+            plan, study, models=models, simplified=simplified, scene=scene, reads=results.reads
+        )[0],
         threshold=threshold,
         planted=planted,
     )
@@ -119,7 +120,7 @@ def power(
         "simulations": simulations,
         "planted": planted,
     }
-    _write(table, plan, out, seen=seen, seed=seed, settings=settings, inputs=inputs)
+    _write(table, plan, results, seed=seed, settings=settings)
 
 
 def sizes_of(text: str) -> tuple[int, ...]:
@@ -183,31 +184,25 @@ def _is_number(text: str) -> bool:
 def _write(
     table: pd.DataFrame,
     plan: Study,
-    out: Path,
+    results: FolderResults,
     *,
-    seen: Contents,
     seed: int,
     settings: dict[str, object],
-    inputs: Mapping[str, str],
 ) -> None:
     from tactileq.analysis.columns import tsv_text
     from tactileq.analysis.page.saving import save_figure, svg_of
     from tactileq.analysis.power.figure import figure_power
-    from tactileq.modeling.files.folders import replace_folder
-    from tactileq.modeling.files.provenance import provenance_of, seal_folder
     from tactileq.modeling.files.writing import write_text
 
-    provenance = provenance_of("power", settings, seed=seed, inputs=inputs)
     marked = table.assign(simulated="true")
     figure = figure_power(table)
-    with replace_folder(out, seen) as fresh:
+    with results.folder(results.provenance(settings, seed=seed)) as fresh:
         write_text(fresh / "power.tsv", tsv_text(marked))
         save_figure(figure, fresh / "power.png", dpi=PICTURE_DPI)
         (fresh / "power.svg").write_bytes(svg_of(figure)[0])
-        seal_folder(fresh, provenance)
-    for line in _sentences(table, plan, out):
+    for line in _sentences(table, plan, results.out):
         print(line)
-    print(f"simulated: {out / 'power.png'}")
+    print(f"simulated: {results.out / 'power.png'}")
 
 
 def _sentences(table: pd.DataFrame, plan: Study, out: Path) -> list[str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -189,10 +191,12 @@ def models_of_study(
     models: Path | None,
     simplified: Path | None,
     scene: Path | None,
+    reads: Callable[..., None] = lambda *paths: None,
 ) -> tuple[ModelSets, dict[str, str]]:
     """The sets of models of a study, and where each came from.
 
-    `models` replaces the study's first set, `simplified` or `scene` its second one.
+    `models` replaces the study's first set, `simplified` or `scene` its second one. `reads` is
+    called with what is read, before it is.
     """
     from tactileq.experiments.study.models import load_model_sets
     from tactileq.modeling.scenes.compiled import FILE as SCENE
@@ -212,11 +216,11 @@ def models_of_study(
     folder = Path() if study is None else study.parent
     places = {name: overriding.get(name, folder / place) for name, place in plan.models.items()}
     sources = {name: str(place) for name, place in places.items()}
+    load = partial(load_model_sets, plan, folder, overriding=overriding, reads=reads)
     if not any(place.suffix == ".toml" for place in places.values()):
-        return load_model_sets(plan, folder, overriding=overriding)[0], sources
+        return load(), sources
     with share_of("Compiling the scene") as advance:
-        sets, _ = load_model_sets(plan, folder, overriding=overriding, progress=advance)
-    return sets, sources
+        return load(progress=advance), sources
 
 
 def open_console(

@@ -17,6 +17,7 @@ from tactileq.options import (
     ThresholdName,
 )
 from tactileq.printing import print_models, progress
+from tactileq.results import Origin
 
 if TYPE_CHECKING:
     from tactileq.experiments.observers.psychometrics import Psychometrics
@@ -43,10 +44,12 @@ def simulate(
     """
     from tactileq.experiments.study.study import Study
     from tactileq.modeling import Threshold
-    from tactileq.modeling.files.hashes import sha256_of_paths
-    from tactileq.modeling.files.provenance import write_provenance
+    from tactileq.modeling.files.provenance import provenance_text
+    from tactileq.modeling.files.writing import write_text
     from tactileq.stimuli.planted.textures import TEXTURES, planted_texture
 
+    origin = Origin("simulate")
+    origin.reads(study, Threshold.file_of(threshold))
     plan = Study.load(study)
     if unknown := [name for name in plan.textures if name not in TEXTURES]:
         raise ValueError(
@@ -54,8 +57,9 @@ def simulate(
             f"of the real surfaces, got {', '.join(unknown)}; test people with tactileq session."
         )
     real = {name: planted_texture(name) for name in plan.textures}
-    sets, sources = models_of_study(plan, study, models=models, simplified=simplified, scene=scene)
-    inputs = sha256_of_paths(file for place in sources.values() for file in _read_for(Path(place)))
+    sets, sources = models_of_study(
+        plan, study, models=models, simplified=simplified, scene=scene, reads=origin.reads
+    )
     sets.require(plan)
     felt_above = Threshold.named(threshold)
     run_study(
@@ -76,7 +80,7 @@ def simulate(
         "threshold_sha256": felt_above.sha256,
         **_scene_settings(sets),
     }
-    write_provenance(note, "simulate", settings, seed=seed, inputs=inputs)
+    write_text(note, provenance_text(origin.provenance(settings, seed=seed)))
     print(f"simulated answers: {data}")
 
 
@@ -85,13 +89,6 @@ def _scene_settings(sets: ModelSets) -> dict[str, object]:
     if sets.scene is None:
         return {}
     return {"scene": sets.scene.scene, "scene_sha256": sets.scene.scene_sha256}
-
-
-def _read_for(place: Path) -> tuple[Path, ...]:
-    """What was read for a set of models: a folder, or a scene file and all that it names."""
-    from tactileq.modeling.scenes.loading import scene_files
-
-    return (place,) if place.is_dir() else scene_files(place)
 
 
 def run_study(

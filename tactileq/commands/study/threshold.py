@@ -9,7 +9,7 @@ import typer
 
 from tactileq.modeling.errors import counted
 from tactileq.options import Data
-from tactileq.own_results import note_of_file, write_own_files
+from tactileq.results import FileResults
 
 
 def threshold(
@@ -38,26 +38,23 @@ def threshold(
         read_answers,
         threshold_text,
     )
-    from tactileq.modeling.files.hashes import sha256_of_paths
-    from tactileq.modeling.files.provenance import provenance_of
 
     if out.suffix != ".tsv":
         raise ValueError(f"expected a file that ends with .tsv, got {out}; rename it.")
-    note = note_of_file(out, "threshold")
+    results = FileResults([out], "threshold")
     require_tables(
         data,
         task="threshold",
         subject=subject,
         otherwise="name another participant with --subject",
     )
-    inputs = sha256_of_paths(answer_files(data, subject=subject))
+    results.reads(*answer_files(data, subject=subject))
     answered = read_answers(data, subject=subject)
     means = mean_thresholds(answered.estimates)
     people = len(answered.estimates)
     text = threshold_text(means, people=people, simulated=answered.simulated)
     settings: dict[str, object] = {"subject": subject, "people": sorted(answered.estimates)}
-    provenance = provenance_of("threshold", settings, inputs=inputs)
-    write_own_files({out: text.encode()}, note, provenance)
+    results.write({out: text.encode()}, results.provenance(settings))
     for one in means:
         within = "" if one.interval_db is None else "{:+.1f} to {:+.1f}, ".format(*one.interval_db)
         note_on = f" ({one.note})" if one.note else ""

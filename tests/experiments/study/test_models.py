@@ -164,7 +164,8 @@ def test_sets_of_every_kind_are_loaded_by_the_studys_paths(tmp_path: Path) -> No
     for name, models in kinds.items():
         saved(tmp_path / name.lower(), models)
     plan = study(full="models", **{name: name.lower() for name in kinds})
-    sets, files = load_model_sets(plan, tmp_path)
+    files: list[Path] = []
+    sets = load_model_sets(plan, tmp_path, reads=lambda *paths: files.extend(paths))
     assert sets.sets == {"full": FULL, **kinds}
     assert files == [tmp_path / "models", *(tmp_path / name.lower() for name in kinds)]
     sets.require(plan)
@@ -174,7 +175,13 @@ def test_another_place_stands_for_the_studys(tmp_path: Path) -> None:
     saved(tmp_path / "study" / "models", FULL)
     elsewhere = saved(tmp_path / "elsewhere", LEAST)
     overriding = {"simplified": elsewhere}
-    sets, files = load_model_sets(study(), tmp_path / "study", overriding=overriding)
+    files: list[Path] = []
+    sets = load_model_sets(
+        study(),
+        tmp_path / "study",
+        overriding=overriding,
+        reads=lambda *paths: files.extend(paths),
+    )
     assert sets.sets["simplified"] == LEAST
     assert files[1] == elsewhere
     with refused(InputError, expected=["full", "simplified"], got="paper"):
@@ -186,7 +193,8 @@ def test_a_scene_is_compiled_from_the_reference(tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE)
     plan = study(full="models", least="scene.toml")
-    sets, files = load_model_sets(plan, tmp_path)
+    files: list[Path] = []
+    sets = load_model_sets(plan, tmp_path, reads=lambda *paths: files.extend(paths))
     assert {sets.of(name, "least").compiled_for.full_sha256 for name in FULL} == {
         model.sha256 for model in FULL.values()
     }
@@ -227,7 +235,8 @@ def test_a_stimulus_set_stands_where_models_stand(tmp_path: Path, turned: bool) 
     (tmp_path / "recipe.toml").write_text(text)
     write_set(tmp_path / "set", Recipe.load(tmp_path / "recipe.toml"))
     plan = study(full="set", simplified="set")
-    sets, files = load_model_sets(plan, tmp_path)
+    files: list[Path] = []
+    sets = load_model_sets(plan, tmp_path, reads=lambda *paths: files.extend(paths))
     assert files == [tmp_path / "set"] * 2
     assert {sets.of("canvas", name).texture for name in sets.names} == {"canvas"}
     assert sets.sha256(["canvas"])["canvas"]["full"] == sets.of("canvas", "full").sha256
@@ -238,7 +247,7 @@ def test_a_stimulus_set_stands_where_models_stand(tmp_path: Path, turned: bool) 
             sets.require(plan)
         return
     sets.require(plan)
-    mixed, _ = load_model_sets(study(full="models", simplified="set"), tmp_path)
+    mixed = load_model_sets(study(full="models", simplified="set"), tmp_path)
     mixed.require(plan)
     assert mixed.of_others(plan.textures) == ()
     with refused(InputError, expected=["full", "texture"], got="PVC"):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tactileq.modeling.files.provenance import PROVENANCE_NAME
-from tactileq.own_results import check_own_results
+from tactileq.results import check_own_results
 
 
 @pytest.fixture

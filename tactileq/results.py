@@ -1,14 +1,102 @@
-"""What a command may replace: its own results and nothing else."""
+"""What a run reads, hashed before it is read, and writes: whole, in the place of its own alone."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tactileq.modeling.files.folders import Contents
+
+
+class Origin:
+    """What the results of a command come from.
+
+    Attributes
+    ----------
+    inputs : dict of str to str
+        SHA-256 of each file and folder that is read, by its path.
+    """
+
+    def __init__(self, command: str) -> None:
+        self.command = command
+        self.inputs: dict[str, str] = {}
+
+    def reads(self, *paths: Path | None) -> None:
+        """Hash files and folders, before they are read; None is none, and what is known stays."""
+        from tactileq.modeling.files.hashes import sha256_of_paths
+
+        new = (path for path in paths if path is not None and str(path) not in self.inputs)
+        self.inputs |= sha256_of_paths(new)
+
+    def provenance(
+        self, settings: Mapping[str, object], *, seed: int | None = None
+    ) -> dict[str, Any]:
+        """Versions, settings, seed and inputs, as they stand beside results."""
+        from tactileq.modeling.files.provenance import provenance_of
+
+        return provenance_of(self.command, settings, seed=seed, inputs=self.inputs)
+
+
+class FolderResults(Origin):
+    """Results that are a folder.
+
+    Parameters
+    ----------
+    out : Path
+        Refused unless it is new, or an earlier run of the same command made all of it.
+    """
+
+    def __init__(self, out: Path, command: str) -> None:
+        super().__init__(command)
+        self.out, self._seen = out, check_own_results(out, command)
+
+    @contextmanager
+    def folder(self, provenance: Mapping[str, Any]) -> Iterator[Path]:
+        """A new folder to fill; sealed with the provenance, as it then is, it takes its place."""
+        from tactileq.modeling.files.folders import replace_folder
+        from tactileq.modeling.files.provenance import seal_folder
+
+        with replace_folder(self.out, self._seen) as fresh:
+            yield fresh
+            seal_folder(fresh, provenance)
+
+
+class FileResults(Origin):
+    """Results that are files of one folder, with their provenance beside them.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        All that may be written; refused as by `check_own_files`.
+    note : Path, optional
+        Their provenance; of a single file by default its name with _provenance.json.
+    texture : str, optional
+        What they are about.
+    inputs : iterable of Path
+        What may not be among the files.
+    """
+
+    def __init__(
+        self,
+        files: Sequence[Path],
+        command: str,
+        *,
+        note: Path | None = None,
+        texture: str | None = None,
+        inputs: Iterable[Path] = (),
+    ) -> None:
+        super().__init__(command)
+        self.note = Path(f"{files[0]}_provenance.json") if note is None else note
+        self.texture = texture
+        check_own_files(files, self.note, command=command, texture=texture, inputs=inputs)
+
+    def write(self, contents: Mapping[Path, bytes], provenance: Mapping[str, Any]) -> None:
+        """Write files with their provenance, all or none."""
+        write_own_files(contents, self.note, provenance, texture=self.texture)
 
 
 def check_own_results(out: Path, command: str) -> Contents:
@@ -89,13 +177,6 @@ def check_own_files(
             f"{made.get('texture')!r}, whose file has the same name; choose another name or folder "
             "with --out."
         )
-
-
-def note_of_file(out: Path, command: str, *, texture: str | None = None) -> Path:
-    """Where the provenance of a single file goes; refused as by `check_own_files`."""
-    note = Path(f"{out}_provenance.json")
-    check_own_files([out], note, command=command, texture=texture)
-    return note
 
 
 def write_own_files(
