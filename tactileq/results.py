@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tactileq.modeling.files.folders import Contents
 
 
-class Origin:
+class CommandRun:
     """What the results of a command come from.
 
     Attributes
@@ -41,7 +41,7 @@ class Origin:
         return provenance_of(self.command, settings, seed=seed, inputs=self.inputs)
 
 
-class FolderResults(Origin):
+class FolderResults(CommandRun):
     """Results that are a folder.
 
     Parameters
@@ -65,7 +65,7 @@ class FolderResults(Origin):
             seal_folder(fresh, provenance)
 
 
-class FileResults(Origin):
+class FileResults(CommandRun):
     """Results that are files of one folder, with their provenance beside them.
 
     Parameters

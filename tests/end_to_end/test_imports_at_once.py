@@ -9,6 +9,7 @@ import numpy as np
 
 from tactileq.commands.recording.imports import add_to_set
 from tactileq.modeling import Recording, RecordingSet
+from tactileq.results import CommandRun
 from tactileq.rig.recording.importing.files import Imported
 
 
@@ -20,7 +21,7 @@ def test_six_imports_at_once_all_arrive(tmp_path: Path) -> None:
     def add(number: int) -> None:
         new = [Imported(Recording(samples, 5000.0, 100.0 + number, 1.0, "oak"))]
         ready.wait()
-        add_to_set(out, new, "import csv", settings={}, inputs={})
+        add_to_set(out, new, CommandRun("import csv"), settings={})
 
     processes = [fork.Process(target=add, args=(number,)) for number in range(6)]
     for process in processes:

@@ -142,7 +142,7 @@ def test_provenance_names_seed_settings_and_inputs(main, study: Path) -> None:
     assert note["seed"] == 0
     assert note["settings"]["threshold"] == "codec"
     assert note["settings"]["study"]["name"] == "small"
-    assert set(note["inputs_sha256"]) == {"models", "simplified"}
+    assert set(note["inputs_sha256"]) == {"models", "simplified", "study.toml"}
     assert all(len(digest) == 64 for digest in note["inputs_sha256"].values())
 
 

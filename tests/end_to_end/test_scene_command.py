@@ -260,7 +260,7 @@ def test_a_study_can_name_a_scene(main, study: Path) -> None:
         done = main("simulate", "--study", "study.toml", "--data", data, "--scene", scene)
         assert done.returncode == 0, done.stderr
         note = json.loads((study / data / "sourcedata/simulate_provenance.json").read_text())
-        assert set(note["inputs_sha256"]) == {"models", scene}
+        assert set(note["inputs_sha256"]) == {"models", "study.toml", scene}
         assert note["settings"]["scene"] == "light touch"
         assert note["settings"]["scene_sha256"] == Scene.load(study / "both.toml").sha256
         described.append((study / data / "dataset_description.json").read_text())

@@ -12,7 +12,7 @@ from tactileq.commands.models.stimuli import print_beyond_grid, recipe_from
 from tactileq.modeling.errors import counted
 from tactileq.options import ModelFile, Seed, VibratorFile
 from tactileq.printing import simulated_note
-from tactileq.results import FileResults, Origin
+from tactileq.results import CommandRun, FileResults
 
 exports = typer.Typer(
     no_args_is_help=True,
@@ -132,8 +132,8 @@ def export_c_header(
     from tactileq.modeling.models.loading import load_model
     from tactileq.stimuli.exports.c_header import c_header
 
-    origin = Origin("export c")
-    origin.reads(model_file, vibrator)
+    ran = CommandRun("export c")
+    ran.reads(model_file, vibrator)
     model = load_model(model_file)
     target = out or Path(f"{file_stem(name or model.texture)}.h")
     results = FileResults([target], "export c", texture=model.texture)
@@ -154,7 +154,7 @@ def export_c_header(
         compensation=compensation,
     )
     settings = {"name": name, "rate_hz": rate_hz, "single": single, "limits": dict(limits)}
-    results.write({target: text.encode()}, origin.provenance(settings, seed=seed))
+    results.write({target: text.encode()}, ran.provenance(settings, seed=seed))
     print(f"{symbol}{simulated_note(model)}{played_by}: {target}")
 
 
@@ -175,8 +175,8 @@ def export_wav_file(
     from tactileq.stimuli.exports.wav import only_stimulus
     from tactileq.stimuli.sets.sources import load_sources
 
-    origin = Origin("export wav")
-    origin.reads(model_file, vibrator)
+    ran = CommandRun("export wav")
+    ran.reads(model_file, vibrator)
     model = load_model(model_file)
     target = out or Path(f"{file_stem(model.texture)}.wav")
     results = FileResults([target], "export wav", texture=model.texture)
@@ -193,7 +193,7 @@ def export_wav_file(
     sources = load_sources(recipe)
     stimulus, data = only_stimulus(recipe, sources)
     settings = {"recipe": recipe.to_toml()}
-    results.write({target: data}, origin.provenance(settings, seed=seed))
+    results.write({target: data}, ran.provenance(settings, seed=seed))
     print_beyond_grid(sources)
     drive = "" if vibrator is None else ", as drive signal for the vibrator"
     simulated = " (simulated)" if stimulus.simulated == "true" else ""
@@ -213,14 +213,14 @@ def export_peq_json(
     from tactileq.modeling.models.loading import load_model
     from tactileq.stimuli.exports.peq_json import peq_document
 
-    origin = Origin("export json")
-    origin.reads(model_file)
+    ran = CommandRun("export json")
+    ran.reads(model_file)
     model = load_model(model_file)
     target = out or Path(f"{file_stem(model.texture)}_peq.json")
     results = FileResults([target], "export json", texture=model.texture)
     document = peq_document(model, speed_mm_s=speed, force_n=force)
     count = len(document["conditions"])
     settings = {"speed_mm_s": speed, "force_n": force}
-    results.write({target: dump_json(document).encode()}, origin.provenance(settings))
+    results.write({target: dump_json(document).encode()}, ran.provenance(settings))
     conditions = counted(count, "condition")
     print(f"{conditions} of {model.texture}{simulated_note(model)}: {target}")

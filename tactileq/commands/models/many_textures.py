@@ -17,7 +17,7 @@ from tactileq.printing import (
     sentence_of,
     simulated_note,
 )
-from tactileq.results import FileResults, Origin
+from tactileq.results import CommandRun, FileResults
 from tactileq.workers import working
 
 if TYPE_CHECKING:
@@ -170,8 +170,8 @@ def _model_one(source: TextureSource, *, out: Path, how: HowToModel) -> _Made:
     try:
         # One thread each: sums must not depend on the number of cores.
         with one_linear_algebra_thread():
-            origin = Origin("model")
-            origin.reads(source.folder)
+            ran = CommandRun("model")
+            ran.reads(source.folder)
             records, unusable = load_usable(source.folder, texture=source.texture)
             found = find_in(
                 records,
@@ -188,7 +188,7 @@ def _model_one(source: TextureSource, *, out: Path, how: HowToModel) -> _Made:
                 "keep_hum": how.keep_hum,
                 "left_out": list(unusable),
             }
-            provenance = origin.provenance(settings)
+            provenance = ran.provenance(settings)
     except (ValueError, OSError, MemoryError) as error:
         return _Made(TextureOutcome(what, error=sentence_of(error)))
     notes = (*_rate_notes(records), *_findings(found, _start(source, out), plot=how.plot))

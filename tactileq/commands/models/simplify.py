@@ -12,7 +12,7 @@ import typer
 from tactileq.modeling.errors import counted
 from tactileq.options import Criterion, HoldAbove, Margin, ModelFile, ThresholdName
 from tactileq.printing import simulated_note, usable_recordings
-from tactileq.results import FileResults, Origin
+from tactileq.results import CommandRun, FileResults
 
 if TYPE_CHECKING:
     from tactileq.modeling import RecordingSet, Simplification, TextureModel
@@ -57,8 +57,8 @@ def simplify(
     from tactileq.modeling import simplify as drop_layers
     from tactileq.modeling.files.writing import file_stem
 
-    origin = Origin("simplify")
-    origin.reads(model_file, Threshold.file_of(threshold), recordings if plot else None)
+    ran = CommandRun("simplify")
+    ran.reads(model_file, Threshold.file_of(threshold), recordings if plot else None)
     full = TextureModel.load(model_file)
     start = out / file_stem(full.texture)
     results = FileResults(
@@ -96,7 +96,7 @@ def simplify(
     }
     settings |= {"full_sha256": full.sha256, "threshold_sha256": result.threshold.sha256}
     contents = {Path(f"{start}{ending}"): data for ending, data in files.items()}
-    results.write(contents, origin.provenance(settings))
+    results.write(contents, ran.provenance(settings))
     print_verdicts(result)
     if result.identical:
         print(

@@ -12,7 +12,7 @@ import typer
 from tactileq.modeling.errors import counted
 from tactileq.options import Out, VibratorFile
 from tactileq.printing import progress
-from tactileq.results import Origin
+from tactileq.results import CommandRun
 
 if TYPE_CHECKING:
     from tactileq.stimuli.sets.recipe import Recipe
@@ -59,8 +59,8 @@ def stimuli(
 
     Example: tactileq stimuli models/*.json simplified/*.json --speed 150 --force 1.5
     """
-    origin = Origin("stimuli")
-    origin.reads(*(path for path in named if path.suffix.lower() == ".toml"), vibrator)
+    ran = CommandRun("stimuli")
+    ran.reads(*(path for path in named if path.suffix.lower() == ".toml"), vibrator)
     recipe = recipe_from(
         named,
         out,
@@ -71,7 +71,7 @@ def stimuli(
         seed=seed,
         vibrator=vibrator,
     )
-    render_stimuli(recipe, out, origin)
+    render_stimuli(recipe, out, ran)
 
 
 def recipe_from(
@@ -123,20 +123,20 @@ def print_passed_over(others: Sequence[Path]) -> None:
         print(f"note: {path} states that it is not a model and is skipped.")
 
 
-def render_stimuli(recipe: Recipe, out: Path, origin: Origin) -> None:
+def render_stimuli(recipe: Recipe, out: Path, ran: CommandRun) -> None:
     """Write a stimulus set with its contact sheet and provenance; report what exceeds the grid."""
     from tactileq.modeling.files.provenance import PROVENANCE_NAME, provenance_text
     from tactileq.modeling.files.writing import write_text
     from tactileq.stimuli.sets.sources import files_behind
 
-    origin.reads(*recipe.files())
-    origin.reads(*files_behind(recipe))
+    ran.reads(*recipe.files())
+    ran.reads(*files_behind(recipe))
 
-    def print_origin(folder: Path) -> None:
-        text = provenance_text(origin.provenance({"recipe": recipe.to_toml()}))
+    def print_run(folder: Path) -> None:
+        text = provenance_text(ran.provenance({"recipe": recipe.to_toml()}))
         write_text(folder / PROVENANCE_NAME, text)
 
-    sources, count = render_set(recipe, out, finish=print_origin)
+    sources, count = render_set(recipe, out, finish=print_run)
     print_passed_over(sources.passed_over)
     print_beyond_grid(sources)
     print(f"{counted(count, 'file')}: {out / 'manifest.tsv'}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactileq.results import FileResults, Origin
+from tactileq.results import CommandRun, FileResults
 
 if TYPE_CHECKING:
     from tactileq.analysis.spectra.vibrator import CompensatedVibrator
@@ -65,8 +65,8 @@ def identify_from(test: Path, out: Path, *, plot: Path | None, simulated: bool) 
         if path.suffix.lower() != ending:
             raise ValueError(f"expected a name that ends in {ending}, got {path}; rename it.")
     results = {path: FileResults([path], "vibrator") for path in files}
-    origin = Origin("vibrator")
-    origin.reads(test)
+    ran = CommandRun("vibrator")
+    ran.reads(test)
     samples, rate_hz = read_wav_channels(test)
     if samples.shape[1] != 2:
         raise ValueError(
@@ -80,7 +80,7 @@ def identify_from(test: Path, out: Path, *, plot: Path | None, simulated: bool) 
     contents = {out: shown.vibrator.to_json().encode()}
     if plot is not None:
         contents[plot] = picture_bytes(figure_vibrator(shown))
-    provenance = origin.provenance({"simulated": simulated})
+    provenance = ran.provenance({"simulated": simulated})
     for path, data in contents.items():
         results[path].write({path: data}, provenance)
     print(f"{_found(shown)}: {out}")

@@ -14,7 +14,7 @@ from tactileq.commands.recording.imports import imports_before
 from tactileq.commands.recording.map import recording_map
 from tactileq.commands.recording.more import NOTHING_MORE, further_conditions
 from tactileq.modeling.errors import counted
-from tactileq.results import Origin
+from tactileq.results import CommandRun
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -151,8 +151,8 @@ def record_by_hand(folder: Path, options: HandRecording) -> None:
             f"expected --more or --grid, got both ({options.grid}); leave out --grid, since --more "
             "takes its conditions from the recordings, or leave out --more."
         )
-    origin = Origin("record --audio")
-    origin.reads(options.rig, options.grid)
+    ran = CommandRun("record --audio")
+    ran.reads(options.rig, options.grid)
     rig = rig_from(options.rig)
     hand, heard = hand_from(rig, options.hand), input_from(rig, options.input)
     if options.more:
@@ -168,7 +168,7 @@ def record_by_hand(folder: Path, options: HandRecording) -> None:
         check_assumed_force(grid, hand.assumed_force_n)
     if rig is not None and options.input.g_per_fullscale is None:
         print_assumed(rig)
-    record_on(grid, folder, options, rig=rig, hand=hand, heard=heard, origin=origin)
+    record_on(grid, folder, options, rig=rig, hand=hand, heard=heard, ran=ran)
 
 
 def record_on(
@@ -179,7 +179,7 @@ def record_on(
     rig: RigFile | None,
     hand: HandSettings,
     heard: InputSettings,
-    origin: Origin,
+    ran: CommandRun,
 ) -> None:
     """Open the devices, and record until the grid is full."""
     from tactileq.rig.desk.lock import rig_locked
@@ -205,7 +205,7 @@ def record_on(
         recorder = StrokeRecorder(
             source,
             since_now(live),
-            store=PieceStore(folder, plan, provenance=origin.provenance(settings)),
+            store=PieceStore(folder, plan, provenance=ran.provenance(settings)),
             g_per_fullscale=heard.g_per_fullscale,
             speed_delay_s=hand.filter_delay_s,
         )

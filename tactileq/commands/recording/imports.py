@@ -14,7 +14,7 @@ import typer
 from tactileq.modeling.errors import counted, shown
 from tactileq.options import Out, Seed
 from tactileq.printing import clipping_warnings, progress
-from tactileq.results import Origin
+from tactileq.results import CommandRun
 
 if TYPE_CHECKING:
     from tactileq.modeling import RecordingSet
@@ -71,13 +71,13 @@ def import_wav(
     """
     from tactileq.rig.recording.importing.files import import_wav_file, usable
 
-    origin = Origin("import wav")
-    origin.reads(*files, labels)
+    ran = CommandRun("import wav")
+    ran.reads(*files, labels)
     named = labels_of(files, labels, texture=texture or out.name, speed=speed, force=force)
     read = partial(import_wav_file, g_per_fullscale=g_per_fullscale, channel=channel)
     records, refused = usable(read, files, named)
     settings = {"g_per_fullscale": g_per_fullscale, "channel": channel, "labels": str(labels)}
-    add_to_set(out, records, origin, settings=settings, left_out=refused, yes=yes)
+    add_to_set(out, records, ran, settings=settings, left_out=refused, yes=yes)
 
 
 @imports.command("csv")
@@ -132,8 +132,8 @@ def import_csv(
             )
         role_of["time"] = time_column
 
-    origin = Origin("import csv")
-    origin.reads(*files, labels)
+    ran = CommandRun("import csv")
+    ran.reads(*files, labels)
     named = labels_of(files, labels, texture=texture or out.name, speed=speed, force=force)
     read = partial(
         import_csv_file, axis=axis, unit=unit, rate_hz=rate_hz, mv_per_g=mv_per_g, named=role_of
@@ -147,7 +147,7 @@ def import_csv(
         "columns": role_of,
         "labels": str(labels),
     }
-    add_to_set(out, records, origin, settings=settings, left_out=refused, yes=yes)
+    add_to_set(out, records, ran, settings=settings, left_out=refused, yes=yes)
 
 
 @imports.command("hatt")
@@ -192,8 +192,8 @@ def import_hatt(
             "expected the grid of --speed and --force or --own-conditions, got both; leave one out."
         )
     files = [file for given in files for file in models_of_the_toolkit(given)]
-    origin = Origin("import hatt")
-    origin.reads(*files)
+    ran = CommandRun("import hatt")
+    ran.reads(*files)
     textures = [load_hatt(file) for file in files]
     check_one_file_each(files, [texture.material for texture in textures])
     grids = [
@@ -226,7 +226,7 @@ def import_hatt(
         "duration_s": duration_s,
         "seed": seed,
     }
-    add_to_set(out, records, origin, settings=settings, yes=yes)
+    add_to_set(out, records, ran, settings=settings, yes=yes)
     print_conditions(made, grids)
 
 
@@ -308,7 +308,7 @@ def _first_of(names: Sequence[str]) -> str:
 def add_to_set(
     out: Path,
     new: Sequence[Imported],
-    origin: Origin,
+    ran: CommandRun,
     *,
     settings: Mapping[str, object],
     left_out: Sequence[str] = (),
@@ -316,7 +316,7 @@ def add_to_set(
 ) -> None:
     """Add imported recordings to those that `out` already holds.
 
-    `origin`: what was read. `left_out`: a sentence for each file that could not be used.
+    `ran`: what was read. `left_out`: a sentence for each file that could not be used.
     Implausible values are refused or, if `yes`, warned about and written into the provenance.
     """
     from tactileq.modeling import RecordingSet
@@ -328,7 +328,7 @@ def add_to_set(
     if doubts and not yes:
         raise ValueError(several(doubts))
     records = RecordingSet(one.recording for one in new)
-    names = [Path(path).name for path in origin.inputs]
+    names = [Path(path).name for path in ran.inputs]
     for sentence in (
         *alike([f"warning: imported anyway: {doubt}" for doubt in doubts], names),
         *alike(clipping_warnings(records), names),
@@ -338,7 +338,7 @@ def add_to_set(
         print(sentence, file=sys.stderr)
     note = out / PROVENANCE_NAME
     taken = {"doubts": doubts} if doubts else {}
-    provenance = origin.provenance({**settings, **taken})
+    provenance = ran.provenance({**settings, **taken})
     # Only quick work is done under the lock, while another import into the same set has to wait.
     with staged(out, records, [one.source for one in new]) as ready, locked(out):
         provenance["settings"]["added to"] = imports_before(note)

@@ -13,7 +13,7 @@ from tactileq.commands.recording.audio import settings_of_run
 from tactileq.commands.recording.more import NOTHING_MORE, further_conditions
 from tactileq.modeling.errors import InputError, counted
 from tactileq.printing import progress
-from tactileq.results import Origin
+from tactileq.results import CommandRun
 
 if TYPE_CHECKING:
     from tactileq.modeling.arrays import Floats
@@ -51,8 +51,8 @@ def record_on_recorder(folder: Path, recorder: str, options: RecorderRecording) 
     )
 
     path = SHIPPED_RECORDER_FILE if recorder == IN_VIRTUAL_TIME else Path(recorder)
-    origin = Origin(COMMAND)
-    origin.reads(path, options.grid)
+    ran = CommandRun(COMMAND)
+    ran.reads(path, options.grid)
     file = RecorderFile.load(path)
     grid = _grid(folder, options)
     if grid is None:
@@ -75,9 +75,7 @@ def record_on_recorder(folder: Path, recorder: str, options: RecorderRecording) 
                 f"{file.path}, or correct the address."
             )
         with _sensor(file, device, options) as sensor:
-            run = _plan_run(
-                folder, grid, options, file=file, device=device, sensor=sensor, origin=origin
-            )
+            run = _plan_run(folder, grid, options, file=file, device=device, sensor=sensor, ran=ran)
             _tell(run)
 
 
@@ -92,16 +90,14 @@ def record_quietly(folder: Path, options: RecorderRecording) -> None:
     from tactileq.rig.machines.recorder.driver import Recorder
     from tactileq.rig.machines.recorder.recorder_file import SHIPPED_RECORDER_FILE, RecorderFile
 
-    origin = Origin(COMMAND)
-    origin.reads(SHIPPED_RECORDER_FILE, options.grid)
+    ran = CommandRun(COMMAND)
+    ran.reads(SHIPPED_RECORDER_FILE, options.grid)
     file = RecorderFile.load(SHIPPED_RECORDER_FILE)
     grid = _grid(folder, options)
     assert grid is not None
     device = Recorder(_virtual(options), file.law())
     with _sensor(file, device, options) as sensor:
-        run = _plan_run(
-            folder, grid, options, file=file, device=device, sensor=sensor, origin=origin
-        )
+        run = _plan_run(folder, grid, options, file=file, device=device, sensor=sensor, ran=ran)
         run.run()
     if run.refused:
         raise InputError(run.refused[0])
@@ -249,7 +245,7 @@ def _plan_run(
     file: RecorderFile,
     device: Recorder,
     sensor: Sensor,
-    origin: Origin,
+    ran: CommandRun,
 ) -> PlanRun:
     """What is still to be recorded into the folder."""
     from tactileq.rig.machines.recorder.recording import PlanRun
@@ -269,7 +265,7 @@ def _plan_run(
         folder,
         plan,
         radius_mm=file.sample.radius.value,
-        provenance=origin.provenance(settings, seed=options.seed if file.simulated else None),
+        provenance=ran.provenance(settings, seed=options.seed if file.simulated else None),
     )
     return PlanRun(device, sensor, store, file.sample.run_in_s, tell=_say)
 

@@ -17,7 +17,7 @@ from tactileq.options import (
     ThresholdName,
 )
 from tactileq.printing import print_models, progress
-from tactileq.results import Origin
+from tactileq.results import CommandRun
 
 if TYPE_CHECKING:
     from tactileq.experiments.observers.psychometrics import Psychometrics
@@ -48,8 +48,8 @@ def simulate(
     from tactileq.modeling.files.writing import write_text
     from tactileq.stimuli.planted.textures import TEXTURES, planted_texture
 
-    origin = Origin("simulate")
-    origin.reads(study, Threshold.file_of(threshold))
+    ran = CommandRun("simulate")
+    ran.reads(study, Threshold.file_of(threshold))
     plan = Study.load(study)
     if unknown := [name for name in plan.textures if name not in TEXTURES]:
         raise ValueError(
@@ -58,7 +58,7 @@ def simulate(
         )
     real = {name: planted_texture(name) for name in plan.textures}
     sets, sources = models_of_study(
-        plan, study, models=models, simplified=simplified, scene=scene, reads=origin.reads
+        plan, study, models=models, simplified=simplified, scene=scene, reads=ran.reads
     )
     sets.require(plan)
     felt_above = Threshold.named(threshold)
@@ -80,7 +80,7 @@ def simulate(
         "threshold_sha256": felt_above.sha256,
         **_scene_settings(sets),
     }
-    write_text(note, provenance_text(origin.provenance(settings, seed=seed)))
+    write_text(note, provenance_text(ran.provenance(settings, seed=seed)))
     print(f"simulated answers: {data}")
 
 

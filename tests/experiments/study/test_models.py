@@ -253,7 +253,7 @@ def test_a_stimulus_set_stands_where_models_stand(tmp_path: Path, turned: bool) 
     with refused(InputError, expected=["full", "texture"], got="PVC"):
         load_model_sets(
             study(full="set", simplified="set"), tmp_path, overriding={"full": tmp_path / "set"}
-        )[0].require(replace(plan, textures=("canvas", "PVC"), trays={"canvas": "A", "PVC": "B"}))
+        ).require(replace(plan, textures=("canvas", "PVC"), trays={"canvas": "A", "PVC": "B"}))
 
 
 def test_places_without_models_are_refused(tmp_path: Path) -> None:
