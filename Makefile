@@ -41,7 +41,7 @@ HEADERS := $(wildcard modeling/*/*.h rig/*/*/*.h benches/*/*.h)
 .venv/installed: .venv/packages pyproject.toml setup.py tools/c_parts.py modeling/rendering/call.c $(HEADERS)
 	@$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@$(BIN)/python -c "from tactileq.modeling.rendering.compiled import is_compiled; is_compiled()"
-	@$(COMPILE) tactileq $(wildcard tactileq/*/)
+	@$(COMPILE) tactileq tactileq/*/
 	@touch $@
 
 demo: install

@@ -1,1 +1,1 @@
-"""Loading, statistics, tables, figures and the report."""
+"""From answers to a report; `columns` and `labels` are names that all share."""

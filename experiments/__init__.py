@@ -1,1 +1,1 @@
-"""Experiments: designs and orders, protocols, store, console and simulated participants."""
+"""Subject sessions, from plan to stored answer."""

@@ -1,4 +1,5 @@
-"""Texture models: from recordings to parameters, to fewer parameters, to vibration.
+"""Pure numerics: no clock, no screen, no plot; `hand`, `seeds`, `checks`, `threads`, `engines` and
+the public `face` lie beside its folders.
 
 Each name is loaded on first use, so that `import tactileq.modeling.errors` loads no numerics.
 """

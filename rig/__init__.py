@@ -1,1 +1,1 @@
-"""The rig, which presents surfaces to a hand, its simulated twin, and the import of recordings."""
+"""What presents surfaces to a hand, and what records them."""

@@ -1,1 +1,1 @@
-"""Surfaces with known truth, and the stimulus sets rendered from models."""
+"""Textures with known truth, stimulus sets and exports."""

@@ -1,5 +1,5 @@
-"""Write what follows from declarations: tables of keys and columns in docs/, JSON Schemas, and what
-a device's definition gives.
+"""Write what follows from declarations: tables of keys, columns and rooms in docs/, JSON Schemas, and
+what a device's definition gives.
 
     python tools/docs_tables.py    # or make docs-tables
 
@@ -9,6 +9,7 @@ test finds all of it current (tests/test_docs_tables.py).
 
 from __future__ import annotations
 
+import ast
 import re
 from functools import partial
 from pathlib import Path
@@ -61,6 +62,7 @@ PAGES = (
     "docs/device-registers.md",
     "docs/recorder.md",
     "docs/recorder-registers.md",
+    "docs/where.md",
 )
 SCHEMAS = {
     "modeling/scenes/shipped/scene.schema.json": "scene",
@@ -79,8 +81,35 @@ DEVICE_FILES = {
         RECORDER,
     ),
 }
+# What folders hold whose __init__.py does not say it: those without one, and the public face.
+FOLDERS = {
+    "modeling/perception/shipped": "Threshold tables that ship.",
+    "modeling/scenes/shipped": "Scenes and micro-controllers that ship.",
+    "stimuli/planted/spectral_statistics": "The statistics that surfaces are drawn from.",
+    "rig/machines/board/boards": "What one writes for another board.",
+    "experiments/console/texts": "The words of the pages, by language.",
+    "tactileq": "The public face; the command line: options, printing, processes, what a run may "
+    "replace.",
+}
+ROOMS = ("modeling", "stimuli", "rig", "experiments", "analysis", "benches", "tactileq")
 _OF_A_DEVICE = {"registers": generating.register_table, "masks": generating.mask_tables}
+
+
+def room_table() -> str:
+    """Each folder of the rooms with its sentence: the first paragraph of its __init__.py."""
+    said = dict(FOLDERS)
+    for room in ROOMS:
+        for path in (ROOT / room).rglob("__init__.py"):
+            doc = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+            folder = path.parent.relative_to(ROOT).as_posix()
+            said.setdefault(folder, " ".join(doc.partition("\n\n")[0].split()))
+    order = sorted(said, key=lambda folder: (ROOMS.index(folder.split("/")[0]), folder))
+    rows = (f"| `{folder}` | {said[folder]} |" for folder in order)
+    return "\n".join(("| folder | holds |", "|---|---|", *rows))
+
+
 _MADE = {
+    "rooms": lambda name: room_table(),
     "keys": lambda name: key_tables(declared(name)),
     "table": lambda name: markdown(TABLES[name]).rstrip("\n"),
     "device": lambda name: _OF_A_DEVICE[name](DEVICE),

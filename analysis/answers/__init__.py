@@ -1,0 +1,1 @@
+"""Loading of answers, each checked; the plan; answers to other programs' experiments."""

@@ -1,0 +1,1 @@
+"""The chapters of the report; `chapter` is what they are given."""

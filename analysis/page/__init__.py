@@ -1,0 +1,1 @@
+"""Parts of every page: tables, pictures, sections, provenance, how figures are drawn and saved."""

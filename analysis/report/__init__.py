@@ -1,0 +1,1 @@
+"""The list of chapters, and the page that they make."""

@@ -1,0 +1,1 @@
+"""Data for pictures of spectra; findings of one texture."""

@@ -1,0 +1,1 @@
+"""What several chapters and planning use: tests, claims, verdicts, rates, mixed models."""

@@ -1,0 +1,1 @@
+"""Where methods fail, a case each."""

@@ -1,1 +1,1 @@
-"""Simulated studies, from answers to verdicts: what `tactileq power` counts."""
+"""Simulated studies, from answers to verdicts."""

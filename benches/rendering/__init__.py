@@ -1,0 +1,1 @@
+"""Time, accuracy and stability of rendering beside rivals."""

@@ -1,0 +1,1 @@
+"""The shipped scenes compiled; compiled textures along strokes."""

@@ -1,1 +1,1 @@
-"""The demonstration for visitors: textures under the hand, and which layers are felt, live."""
+"""The window for visitors."""

@@ -1,0 +1,1 @@
+"""Simulated participants, and what surfaces feel like to them."""

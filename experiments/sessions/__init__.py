@@ -1,0 +1,1 @@
+"""One session and the folder of all."""

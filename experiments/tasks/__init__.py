@@ -1,4 +1,4 @@
-"""The tasks: one module each, of the name under which `ANSWER_TABLES` declares its answers."""
+"""One file for each task; what their plans cost."""
 
 from __future__ import annotations
 

@@ -1,0 +1,1 @@
+"""Is everything as sessions stored it? seals, replay, copies."""

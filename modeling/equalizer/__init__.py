@@ -1,0 +1,1 @@
+"""The one filter of fitting and rendering: coefficients, response, level; `PEQ`; sign patterns."""

@@ -1,0 +1,1 @@
+"""How a participant comes to a rating or a choice: for simulation, planning and verdicts alike."""

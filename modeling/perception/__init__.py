@@ -1,0 +1,1 @@
+"""Thresholds, the power that dropping layers changes, simplification and its verdicts."""

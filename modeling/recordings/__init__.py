@@ -1,0 +1,1 @@
+"""`Recording`, `RecordingSet`; hum, tones and drift; `Spectrum`."""

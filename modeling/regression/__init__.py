@@ -1,0 +1,1 @@
+"""Parameters on speed and force by least squares (eq. 3–4)."""

@@ -1,0 +1,1 @@
+"""A scene and the compiler that finds the least models for it."""

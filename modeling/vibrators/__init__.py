@@ -1,0 +1,1 @@
+"""A vibrator's response, its identification and its compensation (eq. 7)."""

@@ -1,1 +1,3 @@
-"""The desk rig: a sound card that plays, a hand that is read, and a session's interface to them."""
+"""`DeskRig`: hand, sound and accelerometer as one rig, its journal; `twin`s in virtual time;
+`inventory`: what is connected.
+"""

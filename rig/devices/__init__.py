@@ -1,1 +1,1 @@
-"""What senses a hand and what plays, each in a process of its own; how well deadlines are kept."""
+"""What senses a hand and what plays."""

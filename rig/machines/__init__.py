@@ -1,1 +1,1 @@
-"""Machines with firmware or a servo of their own, and the board below them."""
+"""Machines with a servo or firmware of their own."""

@@ -1,1 +1,1 @@
-"""How recordings come about: by hand with an accelerometer, or from other equipment's files."""
+"""How recordings come about."""

@@ -1,1 +1,1 @@
-"""What all parts of a rig share: interface, rig file, clock and memory of processes, wire."""
+"""What all parts of a rig share: `interface` is all that experiments see."""

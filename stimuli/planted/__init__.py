@@ -1,0 +1,1 @@
+"""Planted textures, surfaces drawn from statistics, random spectra, vibrators."""

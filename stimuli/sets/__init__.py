@@ -1,0 +1,1 @@
+"""Recipe → WAV files and their manifest."""

@@ -1,1 +1,1 @@
-"""One file per command: it parses, calls and prints."""
+"""One file for each command, and what commands of a group alone use."""

@@ -1,0 +1,1 @@
+"""Verdicts, and the sentence that answers the question of the report."""

@@ -1,0 +1,1 @@
+"""Which textures were taken for which."""

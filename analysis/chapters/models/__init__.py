@@ -1,0 +1,1 @@
+"""What was dropped, and how similar spectra remain."""

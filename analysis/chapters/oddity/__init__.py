@@ -1,0 +1,1 @@
+"""D′ of the odd one out."""

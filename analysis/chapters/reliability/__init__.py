@@ -1,0 +1,1 @@
+"""Agreement, repeats and careless answers."""

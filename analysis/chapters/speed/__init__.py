@@ -1,0 +1,1 @@
+"""Response times beside right answers."""

@@ -1,0 +1,1 @@
+"""Answers of any experiment, from a table."""

@@ -1,0 +1,1 @@
+"""Pictures of spectra, layers, stimuli and vibrators."""

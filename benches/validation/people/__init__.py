@@ -1,0 +1,1 @@
+"""Worlds of people for the model of the participants."""

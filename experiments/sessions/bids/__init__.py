@@ -1,1 +1,1 @@
-"""What BIDS shows of the data that sessions wrote."""
+"""What BIDS shows of it, and its validator."""

@@ -1,1 +1,1 @@
-"""What a session keeps on disk, and how it is read again."""
+"""What a session keeps on disk and how it is read again: manifest, log, traces, roster."""

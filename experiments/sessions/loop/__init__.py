@@ -1,1 +1,1 @@
-"""One session as it runs: order, people, surfaces, the loop of its trials."""
+"""A session as it runs: order, task, people, surfaces, the loop of its trials."""

@@ -1,1 +1,1 @@
-"""Where a session's answers go: admission, store, exposure, status, withdrawal."""
+"""Where answers go: admission, the store, exposure, status, withdrawal."""

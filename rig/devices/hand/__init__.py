@@ -1,0 +1,1 @@
+"""Devices that sense a hand, the tracking filter, the process that reads them."""

@@ -1,0 +1,1 @@
+"""How well deadlines are kept, beside a bare process."""

@@ -1,0 +1,1 @@
+"""A vibrator and an accelerometer behind an audio server."""

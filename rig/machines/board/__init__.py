@@ -1,1 +1,3 @@
-"""The board below every machine with firmware: its program, its wire, its emulators."""
+"""The firmware's shell in C99, its wire, simulated boards, emulators: below every machine with
+firmware.
+"""

@@ -1,4 +1,4 @@
-"""A device that renders by itself: firmware in C99, emulators, and what a host asks of it.
+"""A device that renders by itself: its law in C99, models for it, what it plays in a rig.
 
 docs/device.md
 """

@@ -1,1 +1,1 @@
-"""Force devices: the servo of a virtual wall, its watchdog, and back ends."""
+"""Force devices: the wall and its states in C, servo, watchdog, back ends, a stand-in."""

@@ -1,1 +1,3 @@
-"""The paper's recorder: a turntable and a contactor, force-controlled without a force sensor."""
+"""The paper's recorder: law and observers in C, simulated mechanics, driver, sensors, plans that go
+on.
+"""

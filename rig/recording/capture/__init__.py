@@ -1,0 +1,1 @@
+"""An accelerometer on a sound card; strokes cut into conditions."""

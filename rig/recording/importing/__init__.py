@@ -1,0 +1,1 @@
+"""Recordings of other equipment: WAV, CSV, phones, the Penn toolkit."""

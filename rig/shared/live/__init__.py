@@ -1,0 +1,1 @@
+"""The clock and the memory that processes share, messages between them, the audio callback in C."""

@@ -1,1 +1,1 @@
-"""The file in which one rig is described."""
+"""The rig file: what is assumed and what is measured of a rig."""

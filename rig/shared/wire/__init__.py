@@ -1,4 +1,4 @@
-"""What a host says to a device: definition, envelope, transports, and the link that uses them.
+"""What host and machine say: registers from one file, frames, ports and sockets, the link's thread.
 
 docs/device.md#the-wire
 """

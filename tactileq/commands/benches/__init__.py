@@ -1,1 +1,1 @@
-"""Commands that compare methods, and demos."""
+"""Commands that compare methods; demos."""

@@ -1,1 +1,1 @@
-"""Commands about models, scenes, stimuli and exports."""
+"""Commands about models, scenes, stimuli, vibrators and exports."""

@@ -1,1 +1,1 @@
-"""Commands about a rig."""
+"""Commands about a rig, and `feel`."""

@@ -1,1 +1,1 @@
-"""Commands about a study and its sessions."""
+"""Commands about a study: its file, sessions, simulated people, power, thresholds; `schema`."""
