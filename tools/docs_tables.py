@@ -1,5 +1,5 @@
-"""Write what follows from declarations: tables of keys, columns and rooms in docs/, JSON Schemas, and
-what a device's definition gives.
+"""Write what follows from declarations: tables of keys, columns and rooms in docs/, JSON Schemas,
+and what a device's definition gives.
 
     python tools/docs_tables.py    # or make docs-tables
 
