@@ -6,6 +6,7 @@ package in the ordinary place, with no setting of theirs, and a new file needs n
 The links are not committed, because Git on Windows makes text files of them.
 """
 
+import os
 import sys
 from pathlib import Path
 
@@ -33,8 +34,10 @@ def link_rooms(top: Path) -> None:
     """Lay the links that are missing; on Windows junctions, which anybody may make."""
     for room in ROOMS:
         link = top / "tactileq" / room
-        if link.exists():
+        if link.resolve() == top / room:
             continue
+        if os.path.lexists(link):  # of a checkout that was moved
+            os.rmdir(link) if sys.platform == "win32" else link.unlink()
         if sys.platform == "win32":
             from _winapi import CreateJunction
 

@@ -20,6 +20,8 @@ def lazily(
     homes : mapping of module name to public names, separated by spaces
         Module names are relative to the package; without names the module itself is public.
     """
+    if not package.startswith("tactileq"):  # as in earlier versions; all would be there twice
+        raise ImportError(f"expected the package tactileq.{package}, got {package}; import that.")
     places = {
         name: module
         for module, names in homes.items()
@@ -35,4 +37,4 @@ def lazily(
         setattr(sys.modules[package], name, found)  # so that it is looked for once
         return found
 
-    return find, lambda: sorted({*vars(sys.modules[package]), *places}), list(places)
+    return find, lambda: sorted(places), list(places)

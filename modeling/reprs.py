@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import Field, fields, is_dataclass
 from typing import Any
 
 MOST_ITEMS = 4
@@ -20,36 +20,39 @@ def one_line(self: Any) -> str:
 
 
 def _telling(self: Any) -> Iterator[tuple[str, Any]]:
-    """Fields with something to say."""
+    """Fields with something to say: not those with their default, nor flags that are not set."""
     for field in fields(self):
         value = getattr(self, field.name)
-        if not field.repr or value is None:
-            continue
-        if hasattr(value, "dtype"):
-            if value.dtype != bool or value.any():
-                yield field.name, value
-        elif field.default_factory is not MISSING:
-            if value != field.default_factory():
-                yield field.name, value
-        elif field.default is MISSING or value != field.default:
+        if field.repr and not _is_usual(value, field):
             yield field.name, value
 
 
+def _is_usual(value: Any, field: Field[Any]) -> bool:
+    if hasattr(value, "dtype"):
+        return bool(value.dtype == bool and not value.any() and field.default is not True)
+    if field.default_factory in (list, dict, tuple):
+        return not len(value)
+    return type(value) is type(field.default) and bool(value == field.default)
+
+
 def _short(value: Any) -> str:
-    if hasattr(value, "dtype") and value.ndim:
-        return _array(value)
+    if hasattr(value, "dtype"):
+        return _array(value) if value.ndim else _short(value.item())
     if isinstance(value, float):
         return f"{value:.4g}"
     if isinstance(value, str):
         return repr(value if len(value) <= LONGEST_TEXT else f"{value[: LONGEST_TEXT - 1]}…")
     if isinstance(value, Mapping | tuple | list):
-        if len(value) > MOST_ITEMS:
-            return f"<{len(value)}>"
-        return f"<{', '.join(map(str if isinstance(value, Mapping) else _short, value))}>"
+        if len(value) > MOST_ITEMS or any(map(is_dataclass, value)):
+            return f"<{len(value)} items>"
+        return f"<{', '.join(map(_short, value))}>"
+    if callable(value):
+        return f"<{getattr(value, '__name__', 'function')}>"
     if is_dataclass(value):
         name = getattr(value, "name", getattr(value, "texture", None))
-        words = (type(value).__name__, name, getattr(value, "simulated", False) and "(simulated)")
-        return f"<{' '.join(str(word) for word in words if word)}>"
+        words = [type(value).__name__, *([_short(name)] if name else [])]
+        words += ["(simulated)"] * bool(getattr(value, "simulated", False))
+        return f"<{' '.join(words)}>"
     return repr(value)
 
 

@@ -4,11 +4,21 @@
 other rooms, each loaded on first use. Modules below it may change.
 """
 
-from tactileq.modeling import HOMES as _MODELING
-from tactileq.modeling.face import lazily
+try:
+    from tactileq.modeling import HOMES as _MODELING
+    from tactileq.modeling.face import lazily
+except ModuleNotFoundError as error:  # a checkout that was not installed
+    raise ImportError(
+        f"expected links to the rooms in {__path__[0]}, got none to modeling; run make install, or "
+        "pip install -e . (setup.py lays them)."
+    ) from error
 
 HOMES = {f"modeling.{module}": names for module, names in _MODELING.items()} | {
+    "modeling.models.loading": "load_any_models load_model",
     "stimuli.planted.textures": "planted_texture record_texture",
+    "rig.recording.importing.files": "import_csv import_wav",
+    "rig.shared.setup.rig_file": "RigFile",
+    "rig.desk.twin": "SimulatedRig",
     "analysis.textures.results": "TextureResult",
     "analysis.spectra.comparison": "compare_spectra",
     "analysis.spectra.figures.spectra": "figure_spectra_and_threshold",

@@ -25,5 +25,11 @@ from tactileq.experiments.study.task_plan import TaskPlan as TaskPlan
 from tactileq.experiments.tasks import plan_session as plan_session
 from tactileq.experiments.tasks import task_named as task_named
 from tactileq.modeling import *  # noqa: F403
+from tactileq.modeling.models.loading import load_any_models as load_any_models
+from tactileq.modeling.models.loading import load_model as load_model
+from tactileq.rig.desk.twin import SimulatedRig as SimulatedRig
+from tactileq.rig.recording.importing.files import import_csv as import_csv
+from tactileq.rig.recording.importing.files import import_wav as import_wav
+from tactileq.rig.shared.setup.rig_file import RigFile as RigFile
 from tactileq.stimuli.planted.textures import planted_texture as planted_texture
 from tactileq.stimuli.planted.textures import record_texture as record_texture

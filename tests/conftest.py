@@ -76,7 +76,8 @@ _LOCK = LockWatch()
 
 
 def pytest_ignore_collect(collection_path: Path) -> bool | None:
-    if collection_path.suffix == ".py" and not is_to_collect(collection_path):
+    of_tests = collection_path.is_relative_to(ROOT / "tests")
+    if of_tests and not is_to_collect(collection_path):  # a folder has a conftest.py, too
         return True
     return None  # others may have a reason
 

@@ -52,7 +52,8 @@ def compared_with_provenance(
     """What runs meanwhile in this process opens no file that was in the folder before but those
     that a provenance then names by SHA-256, and all of those; each is read once it is hashed.
 
-    It may have been read before, too, for instance to learn what else there is to hash.
+    It may have been read before, too, for instance to learn what else there is to hash. What C
+    libraries and other processes open is not heard; of a WAV file its header is.
     """
     before = {path for path in folder.rglob("*") if path.is_file()}
     notes = {path: path.read_bytes() for path in before if path.name.endswith("provenance.json")}
@@ -67,6 +68,7 @@ def compared_with_provenance(
     written = [path for path in folder.glob(note) if path.read_bytes() != notes.get(path)]
     assert written, "no provenance was written"
     read = {path for path, hashed in opened if not hashed and path not in written}
+    assert read, "nothing was read"
     named = {sha256 for path in written for sha256 in _inputs(path).values()}
     for path in sorted(read):
         turns = [hashed for one, hashed in opened if one == path]

@@ -14,6 +14,7 @@ import re
 from functools import partial
 from pathlib import Path
 
+import tactileq
 from tactileq.commands.study.schema import declared
 from tactileq.experiments.sessions.bids import events, people, physio
 from tactileq.experiments.sessions.kept import traces
@@ -131,6 +132,8 @@ def generated() -> dict[str, str]:
 
 
 if __name__ == "__main__":
+    if (found := Path(tactileq.__file__).resolve().parents[1]) != ROOT.resolve():
+        raise SystemExit(f"error: expected tactileq of {ROOT}, got that of {found}; install it.")
     for path, text in generated().items():
         (ROOT / path).parent.mkdir(exist_ok=True)
         (ROOT / path).write_text(text, encoding="utf-8")

@@ -34,6 +34,7 @@ from tactileq.modeling.recordings.spectrum import (
     mean_spectrum,
     smooth,
 )
+from tactileq.modeling.reprs import one_line
 
 PANELS_PER_AXIS = 3
 THRESHOLD_REACH = 2**0.25  # a layer's threshold is drawn a quarter of an octave to both sides
@@ -91,6 +92,8 @@ class SpectrumComparison:
     threshold: Threshold
     hold_above: bool
     criterion: CriterionName
+
+    __repr__ = one_line
 
 
 def compare_spectra(

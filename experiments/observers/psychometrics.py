@@ -18,6 +18,7 @@ from tactileq.modeling.arrays import Floats
 from tactileq.modeling.checks import check_keys, check_number
 from tactileq.modeling.errors import shown
 from tactileq.modeling.participants.ratings import RatingPriors, careless_sds
+from tactileq.modeling.reprs import one_line
 
 RATED_SCALES = ("magnitude_similarity", "frequency_similarity")
 EFFECTS = (*RATED_SCALES, "choice")
@@ -171,6 +172,8 @@ class Psychometrics:
     careless: float = 0.0
     effect_sd: float = 0.0
     planted: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         for name, limits in _LIMITS.items():

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tactileq.modeling import regressed
 from tactileq.stimuli.planted.textures import planted_texture, record_texture
 from tests.conftest import _hatt_xml
 from tests.end_to_end.conftest import CLAIM
@@ -16,7 +17,7 @@ from tests.end_to_end.test_mutated_files import GRID, TEXTURE, write_good_files
 from tests.end_to_end.test_vibrator_command import record as record_noise
 from tests.experiments.tasks.planted_threshold import rows_of, write_answers
 from tests.experiments.tasks.test_threshold_table import answers
-from tests.opened import compared_with_provenance, watched
+from tests.opened import compared_with_provenance
 from tests.two_surfaces import save_two_surfaces
 
 STROKES = ("--speed", 100, "--force", 1)
@@ -36,6 +37,11 @@ participants = 2
 schedule = "interleaved"
 training_trials = 1
 models = ["full", "compiled"]
+"""
+OWN_SCENE = """
+version = 1
+scene = {name = "own", models = "full"}
+hand = {speed_mm_s = [100, 250], force_n = [1, 2.5]}
 """
 COMMANDS: dict[str, tuple[object, ...]] = {
     "model": ("model", "wet/canvas", "--plot"),
@@ -75,6 +81,7 @@ COMMANDS: dict[str, tuple[object, ...]] = {
         *("--threshold", "threshold.tsv"),
     ),
     "simulate a scene": ("simulate", "--study", "scenes.toml", "--data", "new"),
+    "simulate a scene of other models": ("simulate", "--study", "own.toml", "--data", "new"),
     "threshold": ("threshold", "--data", "felt", "--out", "mine.tsv"),
     "tables": (
         *("analyze", "--table", "answers.csv"),
@@ -103,6 +110,12 @@ def _every_kind(folder: Path) -> Path:
     study = folder / "two/study.toml"
     study.write_text(study.read_text() + CLAIM)
     (folder / "scenes.toml").write_text(SCENE_STUDY)
+    (folder / "own-scene.toml").write_text(OWN_SCENE)
+    own = SCENE_STUDY.replace("recorded.toml", "own-scene.toml")
+    (folder / "own.toml").write_text(own.replace('full = "full"', 'full = "driven"'))
+    for model in (TEXTURE, planted_texture("MDF", **GRID)):
+        (folder / "driven").mkdir(exist_ok=True)
+        regressed(model).save(folder / f"driven/{model.texture}.json")
     record_noise(folder / "noise.wav")
     felt = [answers(f, db) for f, db in ((20.0, -30.0), (250.0, -40.0))]
     write_answers(folder / "felt", 1, rows_of([*felt[0], *felt[1]]))
@@ -124,4 +137,3 @@ def test_a_command_reads_what_its_results_name(
     with compared_with_provenance(here, monkeypatch):
         done = main(*COMMANDS[name])
         assert done.returncode == 0, done.stderr
-    assert watched().opened

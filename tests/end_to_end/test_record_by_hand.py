@@ -17,6 +17,7 @@ from tactileq.modeling import RecordingSet
 from tactileq.rig.recording.capture.grid import StrokeGrid
 from tactileq.rig.recording.capture.input import InputSettings
 from tactileq.rig.shared.setup.rig_file import SHIPPED_RIG_FILE, RigFile
+from tactileq.stimuli.planted.vibrators import planted_vibrator
 from tests.conftest import ENDED_WITH_US
 from tests.opened import compared_with_provenance
 from tests.rig.waiting import wait_until
@@ -193,7 +194,9 @@ def test_a_rig_without_an_accelerometer_needs_g_per_full_scale(main, tmp_path: P
 
 
 def test_free_strokes_give_a_grid_to_record(main, tmp_path: Path, monkeypatch) -> None:
-    rig_file(tmp_path, accelerometer=False)
+    rig = rig_file(tmp_path, accelerometer=False)
+    planted_vibrator().save(tmp_path / "vibrator.json")
+    rig.write_text(rig.read_text().replace('# file = "vibrator.json"', 'file = "vibrator.json"'))
     with compared_with_provenance(tmp_path, monkeypatch):
         made = main("rig", "range", "--rig", "rig.toml", "--seconds", 6, "--forces", 1)
         assert made.returncode == 0, made.stderr

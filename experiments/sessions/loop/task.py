@@ -13,6 +13,7 @@ from tactileq.experiments.study.models import ModelSets
 from tactileq.modeling import InputError
 from tactileq.modeling.errors import shown
 from tactileq.modeling.files.answer_tables import ANSWER_TABLES, AnswerColumn
+from tactileq.modeling.reprs import one_line
 from tactileq.rig.shared.interface import Presentable, TextureRig, ToneBurst
 
 
@@ -60,6 +61,8 @@ class Task:
     adapt: Callable[[Any, Sequence[Mapping[str, object]], TextureRig], Any] | None = None
     mounts: bool = True
     feel_all: bool = False
+
+    __repr__ = one_line
 
     def trial_of(self, values: Mapping[str, Any]) -> Trial:
         """A trial as it was before a manifest stored it: what is a list in JSON was a tuple.

@@ -37,7 +37,7 @@ class SimulatedTransducers:
     """What is known of a simulated vibrator and of the accelerometer that it shakes.
 
     It answers a drive w by G_w·(w + (R − 1)·H_BP(w)), one layer as
-    `tactileq.modeling.vibrators.Vibrator` describes it.
+    `tactileq.Vibrator` describes it.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 /* A back end: all that the servo of tactileq needs of a force device. docs/force-device.md#another-device
 
-   Write these two functions for another device, and a Python class that opens it (`tactileq.rig.machines.force.backend`).
+   Write these two functions for another device, and a Python class that opens it, as dhd.py has one.
    They are called by one thread, one to four thousand times a second, and must neither allocate nor wait
    for longer than the device's own communication takes.
 

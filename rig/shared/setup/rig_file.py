@@ -202,8 +202,9 @@ class RigFile(DescribedFile):
     @property
     def files(self) -> tuple[Path, ...]:
         """The other files that it names."""
-        named = self.vibrator.file
-        return () if named is None else (self.path.parent / named,)
+        script = self.hand.script if Path(self.hand.script).suffix else None
+        named = (self.vibrator.file, script)
+        return tuple(self.path.parent / name for name in named if name is not None)
 
     @property
     def fullscale_per_g(self) -> float:

@@ -129,13 +129,15 @@ def input_from(rig: RigFile | None, options: InputOptions) -> InputSettings:
     )
 
 
-def rig_from(path: Path | None) -> RigFile | None:
-    """The rig file, where one is given."""
+def rig_from(path: Path | None, ran: CommandRun) -> RigFile | None:
+    """The rig file, where one is given; the run reads it and what it names."""
     if path is None:
         return None
     from tactileq.rig.shared.setup.rig_file import RigFile
 
-    return RigFile.load(path)
+    ran.reads(path)
+    ran.reads(*RigFile.load(path).files)
+    return RigFile.load(path)  # what it names is read here, too
 
 
 def record_by_hand(folder: Path, options: HandRecording) -> None:
@@ -152,8 +154,8 @@ def record_by_hand(folder: Path, options: HandRecording) -> None:
             "takes its conditions from the recordings, or leave out --more."
         )
     ran = CommandRun("record --audio")
-    ran.reads(options.rig, options.grid)
-    rig = rig_from(options.rig)
+    ran.reads(options.grid, folder if options.more else None)
+    rig = rig_from(options.rig, ran)
     hand, heard = hand_from(rig, options.hand), input_from(rig, options.input)
     if options.more:
         wanted = further_conditions(folder, options.texture)

@@ -52,7 +52,8 @@ def record_on_recorder(folder: Path, recorder: str, options: RecorderRecording) 
 
     path = SHIPPED_RECORDER_FILE if recorder == IN_VIRTUAL_TIME else Path(recorder)
     ran = CommandRun(COMMAND)
-    ran.reads(path, options.grid)
+    own = None if recorder == IN_VIRTUAL_TIME else path
+    ran.reads(own, options.grid, folder if options.more else None)
     file = RecorderFile.load(path)
     grid = _grid(folder, options)
     if grid is None:
@@ -91,7 +92,7 @@ def record_quietly(folder: Path, options: RecorderRecording) -> None:
     from tactileq.rig.machines.recorder.recorder_file import SHIPPED_RECORDER_FILE, RecorderFile
 
     ran = CommandRun(COMMAND)
-    ran.reads(SHIPPED_RECORDER_FILE, options.grid)
+    ran.reads(options.grid)
     file = RecorderFile.load(SHIPPED_RECORDER_FILE)
     grid = _grid(folder, options)
     assert grid is not None

@@ -73,11 +73,12 @@ def publish(
             "own file, or change only [publication]."
         )
     options = _options_of(results, data) if results is not None else {}
-    given |= {name: Path(options[name]) for name in _WITH_MODELS if options.get(name)}
-    written.reads(*given.values())
     if without and options.get("models"):
         options |= dict.fromkeys(_WITH_MODELS)
         print("note: the report is made without the chapters on models, which are left out.")
+    reported = (*_WITH_MODELS, "plan")
+    given |= {name: Path(options[name]) for name in reported if options.get(name)}
+    written.reads(*given.values())
     publication = Publication(
         study=replace(ran, publication=stated.publication),
         data=data,

@@ -52,8 +52,9 @@ def rig_range(
     from tactileq.rig.recording.capture.exploration import explored, grid_for, grid_text
 
     results = FileResults([out], COMMAND)
-    results.reads(rig)
-    settings = hand_from(rig_from(rig), HandOptions(hand, hand_device, counts_per_mm, force))
+    settings = hand_from(
+        rig_from(rig, results), HandOptions(hand, hand_device, counts_per_mm, force)
+    )
     found = explored(watched(settings, seconds))
     grid = grid_for(found, speeds=speeds, forces=forces)
     print(picture(found, grid))
