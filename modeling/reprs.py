@@ -62,5 +62,4 @@ def _array(values: Any) -> str:
         return f"<{' × '.join(map(str, values.shape))}>"
     if values.size <= MOST_ITEMS:
         return f"[{', '.join(map(_short, values.tolist()))}]"
-    first, last = _short(values[0].item()), _short(values[-1].item())
-    return f"<{values.size}: {first} … {last}>"
+    return f"<{values.size}: {_short(values[0])} … {_short(values[-1])}>"

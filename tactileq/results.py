@@ -65,8 +65,10 @@ class FolderResults(CommandRun):
             seal_folder(fresh, provenance)
 
 
-class FileResults(CommandRun):
+class FileResults:
     """Results that are files of one folder, with their provenance beside them.
+
+    No run itself: what the files are called may depend on what was read.
 
     Parameters
     ----------
@@ -89,7 +91,6 @@ class FileResults(CommandRun):
         texture: str | None = None,
         inputs: Iterable[Path] = (),
     ) -> None:
-        super().__init__(command)
         self.note = Path(f"{files[0]}_provenance.json") if note is None else note
         self.texture = texture
         check_own_files(files, self.note, command=command, texture=texture, inputs=inputs)

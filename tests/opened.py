@@ -8,6 +8,8 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
+from itertools import dropwhile
+from operator import not_
 from pathlib import Path
 from typing import Any
 
@@ -70,21 +72,14 @@ def compared_with_provenance(
     read = {path for path, hashed in opened if not hashed and path not in written}
     assert read, "nothing was read"
     named = {sha256 for path in written for sha256 in _inputs(path).values()}
-    for path in sorted(read):
-        turns = [hashed for one, hashed in opened if one == path]
-        assert False in turns[turns.index(True) :] if True in turns else False, (
-            f"{path} was not read after it was hashed"
-        )
-        places = [place for place in (path, *path.parents) if folder in place.parents]
-        assert named & _sha256(places), f"{path} was read, and no provenance names it"
-    for sha256 in named:
-        places = [place for path in read for place in (path, *path.parents)]
-        here = [place for place in dict.fromkeys(places) if folder in place.parents]
-        assert sha256 in _sha256(here), "a provenance names what was not read"
-
-
-def _sha256(places: list[Path]) -> set[str]:
-    return set(sha256_of_paths(places).values())
+    around = {path: [p for p in (path, *path.parents) if folder in p.parents] for path in read}
+    found = sha256_of_paths({place for places in around.values() for place in places})
+    for path, places in sorted(around.items()):
+        turns = (hashed for one, hashed in opened if one == path)
+        assert False in dropwhile(not_, turns), f"{path} was not read after it was hashed"
+        here = {found[str(place)] for place in places}
+        assert named & here, f"{path} was read, and no provenance names it"
+    assert named <= set(found.values()), "a provenance names what was not read"
 
 
 def _inputs(note: Path) -> dict[str, str]:

@@ -136,7 +136,7 @@ def export_c_header(
     ran.reads(model_file, vibrator)
     model = load_model(model_file)
     target = out or Path(f"{file_stem(name or model.texture)}.h")
-    results = FileResults([target], "export c", texture=model.texture)
+    results = FileResults([target], ran.command, texture=model.texture)
     rate_hz = model.rate_hz if rate_hz is None else rate_hz
     compensation, played_by = None, ""
     if vibrator is not None:
@@ -179,7 +179,7 @@ def export_wav_file(
     ran.reads(model_file, vibrator)
     model = load_model(model_file)
     target = out or Path(f"{file_stem(model.texture)}.wav")
-    results = FileResults([target], "export wav", texture=model.texture)
+    results = FileResults([target], ran.command, texture=model.texture)
     recipe = recipe_from(
         [model_file],
         target,
@@ -217,7 +217,7 @@ def export_peq_json(
     ran.reads(model_file)
     model = load_model(model_file)
     target = out or Path(f"{file_stem(model.texture)}_peq.json")
-    results = FileResults([target], "export json", texture=model.texture)
+    results = FileResults([target], ran.command, texture=model.texture)
     document = peq_document(model, speed_mm_s=speed, force_n=force)
     count = len(document["conditions"])
     settings = {"speed_mm_s": speed, "force_n": force}

@@ -63,7 +63,7 @@ def simplify(
     start = out / file_stem(full.texture)
     results = FileResults(
         [Path(f"{start}{ending}") for ending in ENDINGS],
-        "simplify",
+        ran.command,
         note=Path(f"{start}_provenance.json"),
         texture=full.texture,
         inputs=[model_file],

@@ -64,8 +64,8 @@ def identify_from(test: Path, out: Path, *, plot: Path | None, simulated: bool) 
     for path, ending in files.items():
         if path.suffix.lower() != ending:
             raise ValueError(f"expected a name that ends in {ending}, got {path}; rename it.")
-    results = {path: FileResults([path], "vibrator") for path in files}
     ran = CommandRun("vibrator")
+    results = {path: FileResults([path], ran.command) for path in files}
     ran.reads(test)
     samples, rate_hz = read_wav_channels(test)
     if samples.shape[1] != 2:

@@ -17,7 +17,7 @@ from tactileq.commands.recording.audio import (
 from tactileq.modeling.errors import counted
 from tactileq.options import AssumedForce, CountsPerMm, HandDevice, HandKind, OptionalRigPath, Out
 from tactileq.printing import share_of
-from tactileq.results import FileResults
+from tactileq.results import CommandRun, FileResults
 
 if TYPE_CHECKING:
     from tactileq.modeling.arrays import Floats
@@ -51,14 +51,13 @@ def rig_range(
     """
     from tactileq.rig.recording.capture.exploration import explored, grid_for, grid_text
 
-    results = FileResults([out], COMMAND)
-    settings = hand_from(
-        rig_from(rig, results), HandOptions(hand, hand_device, counts_per_mm, force)
-    )
+    ran = CommandRun(COMMAND)
+    results = FileResults([out], ran.command)
+    settings = hand_from(rig_from(rig, ran), HandOptions(hand, hand_device, counts_per_mm, force))
     found = explored(watched(settings, seconds))
     grid = grid_for(found, speeds=speeds, forces=forces)
     print(picture(found, grid))
-    origin = results.provenance({"hand": asdict(settings), "seconds": seconds, **found.to_dict()})
+    origin = ran.provenance({"hand": asdict(settings), "seconds": seconds, **found.to_dict()})
     results.write({out: grid_text(grid, found).encode()}, origin)
     for note_on in notes_on(found, grid):
         print(note_on)

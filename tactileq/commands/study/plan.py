@@ -9,7 +9,7 @@ import typer
 
 from tactileq.commands.study.check import loaded
 from tactileq.options import StudyArgument
-from tactileq.results import FileResults
+from tactileq.results import CommandRun, FileResults
 
 
 def study_plan(
@@ -29,9 +29,10 @@ def study_plan(
 
     if out.suffix.lower() != ".md":
         raise ValueError(f"expected a name that ends in .md, got {out}; rename it.")
-    results = FileResults([out], "study plan")
-    plan, sets = loaded(path, results.reads)
+    ran = CommandRun("study plan")
+    results = FileResults([out], ran.command)
+    plan, sets = loaded(path, ran.reads)
     sha256 = plan_sha256(plan, sets.sha256(plan.textures))
     settings = {"study_sha256": plan.sha256, "plan_sha256": sha256}
-    results.write({out: plan_page(plan, sets).encode()}, results.provenance(settings))
+    results.write({out: plan_page(plan, sets).encode()}, ran.provenance(settings))
     print(f"plan {sha256[:12]}…: {out}")

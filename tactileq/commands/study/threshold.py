@@ -9,7 +9,7 @@ import typer
 
 from tactileq.modeling.errors import counted
 from tactileq.options import Data
-from tactileq.results import FileResults
+from tactileq.results import CommandRun, FileResults
 
 
 def threshold(
@@ -41,20 +41,21 @@ def threshold(
 
     if out.suffix != ".tsv":
         raise ValueError(f"expected a file that ends with .tsv, got {out}; rename it.")
-    results = FileResults([out], "threshold")
+    ran = CommandRun("threshold")
+    results = FileResults([out], ran.command)
     require_tables(
         data,
         task="threshold",
         subject=subject,
         otherwise="name another participant with --subject",
     )
-    results.reads(*answer_files(data, subject=subject))
+    ran.reads(*answer_files(data, subject=subject))
     answered = read_answers(data, subject=subject)
     means = mean_thresholds(answered.estimates)
     people = len(answered.estimates)
     text = threshold_text(means, people=people, simulated=answered.simulated)
     settings: dict[str, object] = {"subject": subject, "people": sorted(answered.estimates)}
-    results.write({out: text.encode()}, results.provenance(settings))
+    results.write({out: text.encode()}, ran.provenance(settings))
     for one in means:
         within = "" if one.interval_db is None else "{:+.1f} to {:+.1f}, ".format(*one.interval_db)
         note_on = f" ({one.note})" if one.note else ""
