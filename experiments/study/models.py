@@ -17,8 +17,7 @@ from tactileq.modeling.models.loading import load_any_models
 from tactileq.modeling.models.loading import made_from as model_made_from
 from tactileq.modeling.reprs import one_line
 from tactileq.modeling.scenes.compiled import FILE as SCENE
-from tactileq.modeling.scenes.loading import scene_models
-from tactileq.modeling.scenes.scene import Scene
+from tactileq.modeling.scenes.loading import scene_files, scene_models
 from tactileq.rig.devices.sound.signals import stimuli_of_surfaces
 from tactileq.rig.shared.interface import Presentable, Stimulus
 
@@ -224,8 +223,7 @@ def load_model_sets(
         reads(place)
         try:
             if place.suffix == ".toml":
-                scene = Scene.load(place)
-                reads(*scene.files, *[scene.models] * (_grids(reference) is None))
+                reads(*scene_files(place, with_models=_grids(reference) is None))
             sets[name] = _models_at(place, reference, study, name=name, progress=progress)
         except InputError as error:
             raise InputError(f"models {name}: {error}") from None

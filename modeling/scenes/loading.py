@@ -78,15 +78,23 @@ def scene_models(
     return compile_scene(scene, known, progress=warn).models
 
 
-def scene_files(path: str | Path) -> tuple[Path, ...]:
-    """What `scene_models` reads besides full models: a scene file and what it names, or a folder.
+def scene_files(path: str | Path, *, with_models: bool = False) -> tuple[Path, ...]:
+    """What `scene_models` reads: a scene file and what it names, or a folder.
+
+    Parameters
+    ----------
+    with_models : bool
+        Also the full models that a scene file names, which are read where none are given.
 
     Raises
     ------
     InputError
         For what is no scene.
     """
-    return (Path(path),) if os.path.isdir(path) else Scene.load(path).files
+    if os.path.isdir(path):
+        return (Path(path),)
+    scene = Scene.load(path)
+    return scene.files if scene.models is None or not with_models else (*scene.files, scene.models)
 
 
 def scene_name(path: str | Path) -> str:

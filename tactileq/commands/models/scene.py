@@ -45,7 +45,7 @@ def scene(
 
     Example: tactileq scene scene.toml --models models --out scene
     """
-    from tactileq.analysis.spectra.scene_files import scene_files
+    from tactileq.analysis.spectra.compiled_files import compiled_files
     from tactileq.modeling import Scene, compile_scene
     from tactileq.modeling.rendering.compiled import is_compiled
     from tactileq.modeling.scenes.loading import full_models
@@ -64,7 +64,7 @@ def scene(
         "scene_sha256": asked.sha256,
         "full_sha256": {each.texture: each.full.sha256 for each in compiled.textures},
     }
-    files = scene_files(compiled, seed=seed)
+    files = compiled_files(compiled, seed=seed)
     if not any(name.endswith(".h") for name in files):
         print("note: no C header: models of different rates need a rate_hz under [actuator].")
     with results.folder(results.provenance(settings, seed=seed)) as fresh:

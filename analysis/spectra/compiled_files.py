@@ -11,7 +11,7 @@ from tactileq.modeling.files.writing import file_stem
 from tactileq.stimuli.exports.scene_header import compiled_header
 
 
-def scene_files(compiled: CompiledScene, *, seed: int) -> dict[str, bytes]:
+def compiled_files(compiled: CompiledScene, *, seed: int) -> dict[str, bytes]:
     """By their names; without a header where the models have different rates.
 
     Parameters
