@@ -88,8 +88,12 @@ class Console:
         """Receive the log for events, such as a request to stop, and the follower of pages."""
         self._runner.note, self._runner.follow = note, page
 
+    def consents(self, version: str) -> bool:
+        """Whether the participant agrees to this version of the consent form."""
+        return intake_pages.consents(self._runner, version)
+
     def welcome(self, intake: Intake) -> dict[str, str | int]:
-        """Consent, code and questions; the answers by question."""
+        """Code and questions; the answers by question."""
         return intake_pages.welcome(self._runner, intake)
 
     def announce(self, page: str, **values: object) -> None:

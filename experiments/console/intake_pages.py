@@ -10,7 +10,6 @@ from tactileq.experiments.console.widgets import Button
 from tactileq.experiments.sessions.loop.people import Intake, SessionAborted
 from tactileq.experiments.study.questions import MOST_DIGITS, MOST_LEVELS, Question
 
-REFUSED = "consent refused"
 ANOTHER = "the code is another person's"
 COLUMN_WIDTHS = (0.6, 0.5, 0.38)  # where answers stand in one column, in two, in three
 ROWS = MOST_LEVELS // len(COLUMN_WIDTHS)  # of answers below each other
@@ -19,8 +18,20 @@ DIGIT_PLACES = {
 } | {"0": (0, -3)}
 
 
+def consents(runner: PageRunner, version: str) -> bool:
+    """Whether the participant agrees to this version of the consent form."""
+    of = runner.texts.of
+    return _ask(
+        runner,
+        "consent",
+        yes=of("consent.agree"),
+        no=of("consent.refuse"),
+        values={"version": version},
+    )
+
+
 def welcome(runner: PageRunner, intake: Intake) -> dict[str, str | int]:
-    """Consent, code and questions; of a person who was here before, the code alone.
+    """Code and questions; of a person who was here before, the code alone.
 
     Returns
     -------
@@ -29,7 +40,7 @@ def welcome(runner: PageRunner, intake: Intake) -> dict[str, str | int]:
     Raises
     ------
     SessionAborted
-        If consent is refused, the code is another person's, or the participant stops.
+        If the code is another person's, or the participant stops.
     InputError
         If a question has no text in the language of the console.
     """
@@ -42,14 +53,6 @@ def welcome(runner: PageRunner, intake: Intake) -> dict[str, str | int]:
         if not yes:
             raise SessionAborted(ANOTHER, by="participant")
         return {}
-    if intake.consent and not _ask(
-        runner,
-        "consent",
-        yes=of("consent.agree"),
-        no=of("consent.refuse"),
-        values={"version": intake.consent},
-    ):
-        raise SessionAborted(REFUSED, by="participant")
     message(runner, "code", values={"code": intake.code})
     return {question.name: answer(runner, question) for question in intake.questions}
 

@@ -82,8 +82,12 @@ class SimulatedParticipant:
     def hear(self, note: Note, page: Callable[[str], None]) -> None:
         """Simulated participants have nothing to note, and see no pages."""
 
+    def consents(self, version: str) -> bool:
+        """Simulated participants always do."""
+        return True
+
     def welcome(self, intake: Intake) -> Mapping[str, str | int]:
-        """Consent, and answer each question at random; no answer to a trial hangs on it."""
+        """Answer each question at random; no answer to a trial hangs on it."""
         return {question.name: self._answer(question) for question in intake.questions}
 
     def _answer(self, question: Question) -> str | int:

@@ -24,6 +24,9 @@ class Scripted:
     def hear(self, note: Note, page: Callable[[str], None]) -> None:
         self.note = note
 
+    def consents(self, version: str) -> bool:
+        return True
+
     def welcome(self, intake: Intake) -> dict[str, str | int]:
         self.asked.append(intake)
         return {question.name: "not said" for question in intake.questions}

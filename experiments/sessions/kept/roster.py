@@ -47,6 +47,8 @@ class Listed:
         Lines before the first one with a seal are an earlier version's.
     sealed : bool
         Whether its last line has a seal.
+    declined : int
+        How many people did not consent, and were not enrolled.
     """
 
     entries: dict[int, dict[str, Any]]
@@ -54,6 +56,7 @@ class Listed:
     seals: tuple[LastSeal, ...] = ()
     broken: int = 0
     sealed: bool = False
+    declined: int = 0
 
 
 @dataclass(frozen=True)
@@ -113,7 +116,8 @@ class Roster:
     ) -> Iterator[RosterEntry]:
         """The participant with this number, enrolled now if never before.
 
-        Who is new is not enrolled after all where the block raises; meanwhile no one else can be.
+        Who is new is not enrolled after all where the block raises and leaves no session of theirs;
+        meanwhile no one else can be.
 
         Parameters
         ----------
@@ -155,7 +159,9 @@ class Roster:
                     subject=number, slot=slot, code=code, known=False, after=_last(listed)
                 )
             except BaseException:
-                os.truncate(self.path, before)
+                # A signal may have come once the session was there: then both stay.
+                if all(files.subject != number for files in sessions_in(self._root)):
+                    os.truncate(self.path, before)
                 raise
 
     def note_seal(self, sealed: LastSeal) -> None:
@@ -168,6 +174,17 @@ class Roster:
         """
         with self._locked():
             self._append("sealed", session=sealed.session, log_seal=sealed.seal)
+
+    def decline(self) -> None:
+        """Count somebody who did not consent; nothing else is kept, not even when it was.
+
+        Raises
+        ------
+        StoreError
+            If the disk does not take it.
+        """
+        with self._locked():
+            self._append(_DECLINED)
 
     def drop(self, subject: int) -> None:
         """Note that a participant will not come again, so that another one gets the slot.
@@ -226,13 +243,17 @@ class Roster:
         """What can be read of it, line by line; raises as `subjects`."""
         entries: dict[int, dict[str, Any]] = {}
         seals: list[LastSeal] = []
-        damaged = []
+        damaged, declined = [], 0
         lines: list[bytes] = []
         if os.path.lexists(self.path):
             *lines, _ = read_bytes(self.path, "the roster").split(b"\n")
             for number, line in enumerate(lines, start=1):
                 try:
-                    _enter(object_of(line), entries, seals)
+                    event = object_of(line)
+                    if event["event"] == _DECLINED:
+                        declined += 1
+                    else:
+                        _enter(event, entries, seals)
                 except (KeyError, TypeError, ValueError):
                     damaged.append(f"line {number} of {self.path}")
         # A list that was cut short between two lines misses somebody who was here.
@@ -245,6 +266,7 @@ class Roster:
             seals=tuple(seals),
             broken=_first_broken(lines),
             sealed=bool(_last_seal(lines)),
+            declined=declined,
         )
 
     @contextmanager
@@ -312,7 +334,8 @@ class Roster:
         handle = open_file(self.path, new=False)
         try:
             size = os.fstat(handle).st_size
-            values = {"utc": utc_text(), "event": event, **fields}
+            time = {} if event == _DECLINED else {"utc": utc_text()}
+            values = {**time, "event": event, **fields}
             before = _last_seal(self.path.read_bytes().splitlines())
             try:
                 write_all(handle, sealed_roster_line(values, before)[0])
@@ -325,6 +348,7 @@ class Roster:
         sync_folder(self.path.parent)
 
 
+_DECLINED = "declined"
 _LEFT = {"dropped": "dropped out", "withdrawn": "withdrew"}
 
 

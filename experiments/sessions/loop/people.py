@@ -28,6 +28,10 @@ class SessionAborted(Exception):
         self.by = by
 
 
+class ConsentRefused(SessionAborted):
+    """Ends a session before it began: the participant did not consent, and is not enrolled."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Rating:
     """The answer to a trial with two scales: similarity, 0 (different) … 100 (identical).
@@ -101,7 +105,7 @@ class Intake:
     Parameters
     ----------
     consent : str
-        Version of the consent form; empty where none is asked for.
+        Version of the consent form that the participant agreed to; empty where there is none.
     code : str
         The participant's pseudonym.
     known : bool
@@ -126,8 +130,12 @@ class Respondent(Protocol):
         """Receive the log for events outside trials, and the follower of the pages shown."""
         ...
 
+    def consents(self, version: str) -> bool:
+        """Whether the participant agrees to this version of the consent form."""
+        ...
+
     def welcome(self, intake: Intake) -> Mapping[str, str | int]:
-        """Ask for consent, the code and the study's questions; the answers by question."""
+        """Ask for the code and the study's questions; the answers by question."""
         ...
 
     def announce(self, page: str, **values: object) -> None:

@@ -9,6 +9,7 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
+from tactileq.experiments.sessions.kept.files import SessionFiles
 from tactileq.experiments.sessions.kept.log import read_log
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
 from tactileq.experiments.sessions.kept.overrides import Overrides
@@ -19,7 +20,7 @@ from tactileq.experiments.sessions.kept.stored_sessions import held_session
 from tactileq.experiments.sessions.kept.writer import StoreError
 from tactileq.experiments.sessions.loop.agenda import Agenda
 from tactileq.experiments.sessions.loop.order import draw_session
-from tactileq.experiments.sessions.loop.people import Intake
+from tactileq.experiments.sessions.loop.people import ConsentRefused, Intake, SessionAborted
 from tactileq.experiments.sessions.loop.task import Task
 from tactileq.experiments.sessions.loop.trial_loop import People, SessionResult, run_trials
 from tactileq.experiments.sessions.store.exposure import exposed_g2_s
@@ -106,6 +107,9 @@ def run_session(
 
     Raises
     ------
+    ConsentRefused
+        If the participant does not consent: the session has not begun, the roster counts it, and
+        nothing else is kept.
     InputError
         If a model is missing, the session cannot begin or be resumed, or the rig cannot be opened.
     StoreError
@@ -128,6 +132,12 @@ def run_session(
             simulated=people.respondent.simulated,
             pilot=said.pilot,
         )
+        _require_consent(
+            _study_of(study, root, task, subject=subject, session=session, resume=said.resume),
+            root,
+            subject,
+            people=people,
+        )
         # Enrolled only if the session may begin.
         with enrolling as person:
             plan = draw_session(study, task, subject=subject, session=session, slot=person.slot)
@@ -140,9 +150,6 @@ def run_session(
                 after={} if person.after is None else asdict(person.after),
                 trials=tuple(trial.to_dict() for trial in plan.trials),
             )
-            files = manifest.files(root)
-            if said.resume and files.manifest.exists():
-                held_session(files)  # nothing goes on that cannot be read to its end
             opened = SessionStore.resume if said.resume else SessionStore.create
             store = opened(root, manifest, overrides=overrides)
         with _sealed(store, root):
@@ -217,15 +224,56 @@ def _require_language(study: Study, language: str) -> None:
         )
 
 
+def _study_of(
+    study: Study, root: Path, task: Task, *, subject: int, session: int, resume: bool
+) -> Study:
+    """The study that a session goes by: of one that is resumed, the one that it began with."""
+    files = SessionFiles(root=root, task=task.name, subject=subject, session=session)
+    if not resume or not files.manifest.exists():
+        return study
+    return Study.from_dict(held_session(files).manifest.study)
+
+
+def _require_consent(study: Study, root: Path, subject: int, *, people: People) -> None:
+    """Ask for consent before anything of the participant is kept, unless it was given before.
+
+    Raises
+    ------
+    ConsentRefused
+    """
+    version = study.consent.version
+    if not version or _was_welcomed(root, subject, version):
+        return
+    people.respondent.hear(_unheard, people.experimenter.page)
+    try:
+        if people.respondent.consents(version):
+            return
+    except SessionAborted:
+        pass  # who leaves the page has not consented
+    Roster(root).decline()
+    with suppress(SessionAborted):
+        people.respondent.announce("consent.closing")
+    raise ConsentRefused("consent refused")
+
+
+def _unheard(event: str, **fields: object) -> None:
+    """Of who has not consented nothing is noted."""
+
+
 def _intake(study: Study, root: Path, person: RosterEntry) -> Intake:
     """What to ask first; of who gave this consent before, only whether the code is theirs."""
-    logs = (root / "sourcedata" / f"sub-{person.subject:02d}").glob("ses-*/*_log.jsonl")
     return Intake(
         consent=study.consent.version,
         code=person.code,
-        known=any(_welcomes(log, study.consent.version) for log in logs),
+        known=_was_welcomed(root, person.subject, study.consent.version),
         questions=study.questions,
     )
+
+
+def _was_welcomed(root: Path, subject: int, consent: str) -> bool:
+    """Whether somebody was welcomed in an earlier session, having given this consent."""
+    logs = (root / "sourcedata" / f"sub-{subject:02d}").glob("ses-*/*_log.jsonl")
+    return any(_welcomes(log, consent) for log in logs)
 
 
 def _welcomes(log: Path, consent: str) -> bool:

@@ -133,10 +133,8 @@ class SessionStore:
                 with _claimed(files) as lock:
                     try:
                         return cls._begin(files, final, lock)
-                    except OSError:
-                        for path in files.there():  # all of them ours, and nothing happened yet
-                            with suppress(OSError):
-                                path.unlink()
+                    except BaseException:
+                        _remove(files)  # all of them ours, and nothing happened yet
                         raise
         except OSError as error:
             raise store_error(error, files.root, _NOTHING) from error
@@ -209,7 +207,7 @@ class SessionStore:
         try:
             event = {"manifest_sha256": sha256, **fields, **cut}
             self._writer.put_safely(self._event("opened", event))
-        except StoreError:
+        except BaseException:
             with suppress(StoreError):
                 self.close()
             raise
@@ -321,6 +319,13 @@ class SessionStore:
         except StoreError:
             if error is None:  # else it would hide what went wrong first
                 raise
+
+
+def _remove(files: SessionFiles) -> None:
+    """Remove all files of a session, the manifest last: while it is there, the session is."""
+    for path in sorted(files.there(), key=files.manifest.__eq__):
+        with suppress(OSError):
+            path.unlink()
 
 
 @contextmanager

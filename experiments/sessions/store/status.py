@@ -79,11 +79,14 @@ class StudyProgress:
     ----------
     damaged : tuple of str
         What cannot be read of the roster.
+    declined : int
+        How many people did not consent.
     """
 
     people: tuple[PersonProgress, ...]
     tasks: tuple[TaskProgress, ...]
     damaged: tuple[str, ...] = ()
+    declined: int = 0
 
 
 def study_progress(
@@ -129,6 +132,7 @@ def study_progress(
         people=people,
         tasks=_tasks(people, wanted),
         damaged=(roster.damaged,) if roster.damaged else (),
+        declined=roster.declined,
     )
 
 

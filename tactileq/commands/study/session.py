@@ -75,6 +75,7 @@ def session(
     from tactileq.experiments.sessions.bids.export import export_session
     from tactileq.experiments.sessions.kept.log import SEAL_WRITTEN
     from tactileq.experiments.sessions.kept.overrides import Overrides
+    from tactileq.experiments.sessions.loop.people import ConsentRefused
     from tactileq.experiments.sessions.loop.running import Circumstances, run_session
     from tactileq.experiments.sessions.loop.trial_loop import People
     from tactileq.experiments.study.study import Study
@@ -105,17 +106,21 @@ def session(
     with open_console(
         plan, language=language, stamp=stamp, fullscreen=fullscreen, screen=screen
     ) as console:
-        result, manifest = run_session(
-            task_named(task),
-            plan,
-            subject=subject,
-            session=number,
-            models=sets,
-            rig=device,
-            people=People(respondent=console, experimenter=Terminal()),
-            data_folder=data,
-            circumstances=circumstances,
-        )
+        try:
+            result, manifest = run_session(
+                task_named(task),
+                plan,
+                subject=subject,
+                session=number,
+                models=sets,
+                rig=device,
+                people=People(respondent=console, experimenter=Terminal()),
+                data_folder=data,
+                circumstances=circumstances,
+            )
+        except ConsentRefused:
+            print("consent refused: nobody was enrolled, the slot is free; only the count is kept.")
+            return
     export_session(data, manifest)
     if result.seal:
         print(f"seal of this session, for the checklist: {result.seal[-SEAL_WRITTEN:]}")

@@ -35,6 +35,8 @@ def study_status(data: Data = Path("data"), study: StudyFile = None) -> None:
     Console().print(table_of(progress))
     for task in progress.tasks:
         print(f"{task.task}: {task.complete} of {task.planned} planned sessions complete")
+    if progress.declined:
+        print(f"declined: {counted(progress.declined, 'person', 'people')} did not consent")
     print_made(made)
     for damage in progress.damaged:
         print(f"damaged: {damage}")

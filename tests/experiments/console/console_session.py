@@ -116,6 +116,8 @@ def surfaces_of(count, begin, *, feel_all=False):
 def run(console, part):
     if part in ("known", "new"):
         known = part == "known"
+        if not known and not console.consents("2026-11"):
+            return "consent refused"
         return console.welcome(
             Intake(consent="2026-11", code="TAKI-46", known=known, questions=QUESTIONS)
         )

@@ -171,11 +171,12 @@ def ask_everything(console, visitor):
         },
     }
     new = Intake(consent="2026-11", code="TAKI-46", known=False, questions=questions)
+    console.consents("2026-11")
     console.welcome(new)
     console.welcome(Intake(consent="", code="TAKI-46", known=True, questions=questions))
     visitor.plan = {"consent": ["key ESCAPE"], "stop": ["look stop-first", "press stop now"]}
     with suppress(SessionAborted):
-        console.welcome(new)
+        console.consents("2026-11")
 
 
 def announce_everything(console, visitor, texts):

@@ -21,7 +21,12 @@ from tactileq.experiments.sessions.kept.manifest import SessionManifest
 from tactileq.experiments.sessions.kept.roster import Roster
 from tactileq.experiments.sessions.kept.state import session_state
 from tactileq.experiments.sessions.kept.writer import StoreError
-from tactileq.experiments.sessions.loop.people import Intake, Rating, SessionAborted
+from tactileq.experiments.sessions.loop.people import (
+    ConsentRefused,
+    Intake,
+    Rating,
+    SessionAborted,
+)
 from tactileq.experiments.sessions.loop.running import Circumstances, run_session
 from tactileq.experiments.sessions.loop.surfaces import Surfaces
 from tactileq.experiments.sessions.loop.trial_loop import People, SessionResult
@@ -32,6 +37,7 @@ from tactileq.experiments.study.questions import Question
 from tactileq.experiments.study.study import Consent, Study
 from tactileq.experiments.study.task_plan import TaskPlan
 from tactileq.experiments.tasks import plan_session, task_named
+from tactileq.experiments.verification.verifying import verify_data
 from tactileq.modeling import InputError
 from tactileq.modeling.files.locks import is_held
 from tactileq.modeling.files.places import LOCK_NAME
@@ -491,6 +497,56 @@ def test_another_consent_is_asked_for_again(run: Callable[..., Any], small: Stud
         override="the ethics committee asked for another form",
     )
     assert not again.asked[0].known
+
+
+class Refuses(Scripted):
+    """Does not agree to the consent form, or leaves its page."""
+
+    def __init__(self, *, leaves: bool) -> None:
+        super().__init__()
+        self._leaves = leaves
+
+    def consents(self, version: str) -> bool:
+        if self._leaves:
+            raise SessionAborted("not stated")
+        return False
+
+
+@pytest.mark.parametrize("leaves", [False, True])
+def test_of_who_does_not_consent_only_the_count_is_kept(
+    run: Callable[..., Any], small: Study, tmp_path: Path, *, leaves: bool
+) -> None:
+    asking = replace(small, consent=Consent(version="1"))
+    refusing = Refuses(leaves=leaves)
+    for _ in range(2):
+        with pytest.raises(ConsentRefused):
+            run(refusing, study=asking)
+    assert refusing.heard == ["consent.closing"] * 2
+    assert refusing.asked == []
+    assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == ["roster.jsonl"]
+    assert "utc" not in (tmp_path / "sourcedata/roster.jsonl").read_text()
+    listed = Roster(tmp_path).listed()
+    assert (listed.declined, listed.entries, listed.damaged, listed.broken) == (2, {}, "", 0)
+    result, _ = run(study=asking)  # the number and its slot are free
+    assert result.completed
+    assert Roster(tmp_path).subjects()[1]["slot"] == 1
+    assert study_progress(tmp_path).declined == 2
+    export_all(tmp_path)
+    wrong = {one.place for one in verify_data(tmp_path).differences}
+    assert wrong == {"sourcedata/sub-01/ses-01/sub-01_ses-01_task-absolute_log.jsonl"}
+
+
+def test_who_refuses_another_consent_stays_as_before(
+    run: Callable[..., Any], small: Study, tmp_path: Path
+) -> None:
+    _, manifest = run(Tired(2), study=replace(small, consent=Consent(version="1")))
+    before = log_beside(manifest).read_bytes()
+    other = {"study": replace(small, consent=Consent(version="2")), "override": "another form"}
+    with pytest.raises(ConsentRefused):
+        run(Refuses(leaves=False), task="relative", **other)
+    assert log_beside(manifest).read_bytes() == before
+    result, _ = run(Refuses(leaves=False), resume=True, **other)  # its own consent was given
+    assert result.completed
 
 
 def test_every_rule_that_is_broken_is_told(run: Callable[..., Any], small: Study) -> None:
