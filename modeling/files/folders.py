@@ -110,7 +110,6 @@ def replace_folder(path: str | Path, seen: Contents | None = None) -> Iterator[P
         with _named(target, fresh):
             fresh.mkdir()
             yield fresh
-            fresh.chmod(0o755)
             sync_tree(fresh)
             try:
                 with locked(target):

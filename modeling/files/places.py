@@ -120,7 +120,6 @@ def unfinished_file(target: Path, data: bytes) -> Iterator[Path]:
                 file.write(data)
                 file.flush()
                 os.fsync(file.fileno())
-            made.chmod(0o644)
             yield made
         finally:
             made.unlink(missing_ok=True)

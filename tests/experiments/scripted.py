@@ -60,6 +60,29 @@ class Scripted:
         return Choice(button=1, response_time_s=3.25)
 
 
+def rated(trial: int, **others: Any) -> dict[str, Any]:
+    """A row of the absolute task as the trial loop stores it."""
+    row = {
+        "trial": trial,
+        "phase": "main",
+        "texture": "canvas",
+        "model": "full",
+        "tray": "C",
+        "virtual_texture": "canvas",
+        "first_surface": "real",
+        "magnitude_similarity": 70.0,
+        "frequency_similarity": 30.5,
+        "toggles": 2,
+        "response_time_s": 2.5,
+        "run": 1,
+        "valid": 1,
+        "repeats": None,
+        "pilot": False,
+        "simulated": False,
+    }
+    return row | others
+
+
 class Ready:
     """An experimenter who is always ready; notes what was asked."""
 

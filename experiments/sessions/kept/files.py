@@ -111,9 +111,12 @@ def sessions_in(data_folder: str | Path) -> tuple[SessionFiles, ...]:
 
 
 def open_file(path: Path, *, new: bool) -> int:
-    """A handle to append to a file: one that must not be there yet, or one that may."""
+    """A handle to append to a file: one that must not be there yet, or one that may.
+
+    Who else may write to it is for the mask to say, as of all files: a laboratory shares a folder.
+    """
     flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_BINARY", 0)
-    return os.open(path, flags | (os.O_EXCL if new else 0), 0o644)
+    return os.open(path, flags | (os.O_EXCL if new else 0), 0o666)
 
 
 def write_all(handle: int, data: bytes) -> None:

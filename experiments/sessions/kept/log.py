@@ -29,7 +29,7 @@ SEAL_WRITTEN = 8  # last characters of a seal, which an experimenter writes down
 _LONGEST_S = 1e9  # of a run: 30 years
 _SEAL = b', "seal": "%s"}'
 _LINE_AND_MORE = re.compile(rb', "seal": "[0-9a-f]{16}"}.', re.DOTALL)
-_YEARS = range(2000, 2200)  # in which every time zone has a date for a moment
+YEARS = range(2000, 2200)  # in which every time zone has a date for a moment
 
 
 @dataclass(frozen=True)
@@ -76,12 +76,8 @@ def read_log(path: str | Path) -> Log:
             got = shown(line.decode("utf-8", "replace"))
             raise _malformed(Path(path), number, got) from None
         runs += event.get("event") == "opened"
-        wanted = {"n": number, "run": runs}
-        for name, holds in (_FIELDS | _FIELDS_OF.get(str(event.get("event")), {})).items():
-            value = event.get(name)
-            if not holds(value) or value != wanted.get(name, value):
-                got = f"{name} = {shown(value)}" if name in event else f"no {name}"
-                raise _malformed(Path(path), number, got)
+        if got := _wrong_in(event, {"n": number, "run": runs}):
+            raise _malformed(Path(path), number, got)
         if "seal" in (events[0] if events else event):
             seal = seal_after(seal, line.removesuffix(_SEAL % str(event.get("seal")).encode()))
         if event.get("seal", "") != seal:
@@ -94,13 +90,35 @@ def read_log(path: str | Path) -> Log:
     return Log(tuple(events), cut)
 
 
+def check_event(event: Mapping[str, Any]) -> None:
+    """Refuse to write what `read_log` would refuse to read.
+
+    Raises
+    ------
+    ValueError
+        Naming the field.
+    """
+    read_back = object_of(line_of({"n": 1, **event}))
+    if got := _wrong_in(read_back, {}):
+        raise ValueError(f"expected an event that can be read again, got {got}")
+
+
+def _wrong_in(event: Event, wanted: Mapping[str, int]) -> str:
+    """The first invalid field of an event; empty where there is none."""
+    for name, holds in (_FIELDS | _FIELDS_OF.get(str(event.get("event")), {})).items():
+        value = event.get(name)
+        if not holds(value) or value != wanted.get(name, value):
+            return f"{name} = {shown(value)}" if name in event else f"no {name}"
+    return ""
+
+
 def is_time(value: object) -> bool:
     """Whether this is a time as `utc_text` writes it."""
     try:
         moment = datetime.fromisoformat(value) if isinstance(value, str) else None
     except ValueError:
         return False
-    return moment is not None and moment.utcoffset() is not None and moment.year in _YEARS
+    return moment is not None and moment.utcoffset() is not None and moment.year in YEARS
 
 
 def _or_none(holds: Callable[[object], bool]) -> Callable[[object], bool]:

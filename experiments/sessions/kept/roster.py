@@ -14,7 +14,13 @@ from pathlib import Path
 from typing import Any
 
 from tactileq.experiments.sessions.kept.files import open_file, sessions_in, write_all
-from tactileq.experiments.sessions.kept.log import line_of, object_of, seal_after, utc_text
+from tactileq.experiments.sessions.kept.log import (
+    is_time,
+    line_of,
+    object_of,
+    seal_after,
+    utc_text,
+)
 from tactileq.experiments.sessions.kept.writer import StoreError, store_error
 from tactileq.modeling import InputError
 from tactileq.modeling.checks import check_whole
@@ -49,6 +55,8 @@ class Listed:
         Whether its last line has a seal.
     declined : int
         How many people did not consent, and were not enrolled.
+    latest_utc : str
+        The latest time on it; empty where there is none.
     """
 
     entries: dict[int, dict[str, Any]]
@@ -57,6 +65,7 @@ class Listed:
     broken: int = 0
     sealed: bool = False
     declined: int = 0
+    latest_utc: str = ""
 
 
 @dataclass(frozen=True)
@@ -243,7 +252,7 @@ class Roster:
         """What can be read of it, line by line; raises as `subjects`."""
         entries: dict[int, dict[str, Any]] = {}
         seals: list[LastSeal] = []
-        damaged, declined = [], 0
+        damaged, declined, latest_utc = [], 0, ""
         lines: list[bytes] = []
         if os.path.lexists(self.path):
             *lines, _ = read_bytes(self.path, "the roster").split(b"\n")
@@ -254,6 +263,7 @@ class Roster:
                         declined += 1
                     else:
                         _enter(event, entries, seals)
+                        latest_utc = max(latest_utc, _time_of(event))
                 except (KeyError, TypeError, ValueError):
                     damaged.append(f"line {number} of {self.path}")
         # A list that was cut short between two lines misses somebody who was here.
@@ -267,6 +277,7 @@ class Roster:
             broken=_first_broken(lines),
             sealed=bool(_last_seal(lines)),
             declined=declined,
+            latest_utc=latest_utc,
         )
 
     @contextmanager
@@ -397,6 +408,12 @@ def _without_code(line: bytes, subject: int) -> bytes:
         return line
     enrolment = event.get("event") == "enrolled" and event.get("subject") == subject
     return line_of({**event, "code": ""}) if enrolment else line
+
+
+def _time_of(event: Mapping[str, Any]) -> str:
+    """In UTC, as every line has it; empty where it is none, which nothing else hangs on."""
+    utc = event.get("utc")
+    return utc if is_time(utc) else ""
 
 
 def _last(listed: Listed) -> LastSeal | None:

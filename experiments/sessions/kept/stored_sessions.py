@@ -125,15 +125,15 @@ def _check_place(manifest: SessionManifest, files: SessionFiles) -> None:
 
 def _check_rows(events: Iterable[Event], files: SessionFiles) -> None:
     for event in events:
-        if event["event"] == "answer" and (wrong := _wrong_in(event["row"], files.task)):
+        if event["event"] == "answer" and (wrong := wrong_in(event["row"], files.task)):
             raise InputError(
                 f"expected an answer to the task {files.task} in line {event['n']} of {files.log}, "
                 f"got {wrong}; restore the file from a copy."
             )
 
 
-def _wrong_in(row: Mapping[str, Any], task: str) -> str:
-    """The first invalid value of an answer; empty where there is none."""
+def wrong_in(row: Mapping[str, Any], task: str) -> str:
+    """The first invalid value of an answer to this task; empty where there is none."""
     for column in ANSWER_TABLES[task].columns:
         if not column.holds(value := row.get(column.name)):
             return f"{column.name} = {shown(value)}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Mapping
 from contextlib import suppress
@@ -20,10 +21,22 @@ class StoreError(OSError):
 
 
 SAFE = "what was answered before is safe: free disk space, then continue with --resume"
+# Of another person's files, in whose group the folder may be.
+_NOT_ALLOWED = (errno.EACCES, errno.EPERM)
+_ALLOW = (
+    "nothing more was stored: let its owner allow it (chmod -R g+w, and umask 002 from now on), or "
+    "choose another data folder"
+)
 
 
 def store_error(error: OSError, path: Path, advice: str = SAFE) -> StoreError:
-    """The error for a disk that stored nothing; `advice` says what is safe, and what to do."""
+    """The error for a disk that stored nothing; `advice` says what is safe, and what to do.
+
+    It is about a disk that is full or fails; where the system does not allow it, that is said.
+    """
+    advice = _ALLOW if error.errno in _NOT_ALLOWED else advice
+    if error.errno in _NOT_ALLOWED and isinstance(error.filename, str | Path):
+        path = Path(error.filename)
     return StoreError(f"expected to write to {path}, got {reason_of(error)}; {advice}.")
 
 

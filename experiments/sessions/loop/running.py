@@ -23,6 +23,7 @@ from tactileq.experiments.sessions.loop.order import draw_session
 from tactileq.experiments.sessions.loop.people import ConsentRefused, Intake, SessionAborted
 from tactileq.experiments.sessions.loop.task import Task
 from tactileq.experiments.sessions.loop.trial_loop import People, SessionResult, run_trials
+from tactileq.experiments.sessions.store.admission import check_clock
 from tactileq.experiments.sessions.store.exposure import exposed_g2_s
 from tactileq.experiments.sessions.store.session_store import SessionStore
 from tactileq.experiments.study.design import SessionPlan
@@ -46,7 +47,7 @@ class Circumstances:
     override : str, optional
         Reason to continue where a rule is broken; stored.
     tell : callable, optional
-        Called with each rule that is broken for that reason.
+        Called with each rule that is broken for that reason, and where the clock was set back.
     resume : bool
         Whether to continue with a session that was aborted or interrupted.
     sources : mapping of set of models to path
@@ -120,6 +121,7 @@ def run_session(
     models.require(study, allow=overrides.allow)
     _require_language(study, said.language)
     root = Path(data_folder)
+    check_clock(root, tell=said.tell or _untold)
     for stimulus in models.stimuli:
         rig.check_stimulus(stimulus)
     rig.open()
@@ -254,6 +256,10 @@ def _require_consent(study: Study, root: Path, subject: int, *, people: People) 
     with suppress(SessionAborted):
         people.respondent.announce("consent.closing")
     raise ConsentRefused("consent refused")
+
+
+def _untold(sentence: str) -> None:
+    """Nobody is there to be told."""
 
 
 def _unheard(event: str, **fields: object) -> None:

@@ -5,14 +5,17 @@ docs/method/protocols.md#admission
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from datetime import date, datetime
+from datetime import date, datetime, timedelta
+from pathlib import Path
 
 from tactileq.experiments.sessions.kept.data_set import claim_data_set
 from tactileq.experiments.sessions.kept.files import SessionFiles
-from tactileq.experiments.sessions.kept.log import now_utc
+from tactileq.experiments.sessions.kept.log import YEARS, now_utc, utc_text
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
 from tactileq.experiments.sessions.kept.overrides import Overrides
+from tactileq.experiments.sessions.kept.roster import Roster
 from tactileq.experiments.sessions.kept.state import session_state
 from tactileq.modeling import InputError
 
@@ -22,6 +25,38 @@ _AGAIN = {
     "aborted": "it was aborted; continue with --resume",
     "crashed": "it was interrupted; continue with --resume",
 }
+
+
+# Two computers that share a folder differ by less.
+_CLOCKS_DIFFER = timedelta(minutes=1)
+
+
+def check_clock(root: Path, *, tell: Callable[[str], None]) -> None:
+    """Refuse a clock whose times cannot be read again, and tell of one that was set back.
+
+    Parameters
+    ----------
+    root : Path
+        Of the data set.
+    tell : callable
+        Called with one sentence where the clock stands before the last line of the roster.
+
+    Raises
+    ------
+    InputError
+    """
+    now = now_utc()
+    if now.year not in YEARS:
+        raise InputError(
+            f"expected a clock between the years {YEARS[0]} and {YEARS[-1]}, got {utc_text(now)}; "
+            "set the date and time of this computer."
+        )
+    latest = Roster(root).listed().latest_utc
+    if latest and now + _CLOCKS_DIFFER < datetime.fromisoformat(latest):
+        tell(
+            f"note: the clock of this computer says {utc_text(now)}, which is before {latest}, "
+            "when something was stored here last; set it if it is wrong."
+        )
 
 
 def admit(files: SessionFiles, manifest: SessionManifest, *, overrides: Overrides) -> None:

@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from datetime import datetime, timedelta
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -21,11 +22,19 @@ from tactileq.experiments.sessions.kept.files import (
     open_file,
     write_new,
 )
-from tactileq.experiments.sessions.kept.log import OWN_FIELDS, SESSION_ENDS, read_log, utc_text
+from tactileq.experiments.sessions.kept.log import (
+    OWN_FIELDS,
+    SESSION_ENDS,
+    check_event,
+    is_time,
+    plain,
+    read_log,
+    utc_text,
+)
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
 from tactileq.experiments.sessions.kept.overrides import Overrides
 from tactileq.experiments.sessions.kept.state import SessionState, state_of
-from tactileq.experiments.sessions.kept.stored_sessions import check_named
+from tactileq.experiments.sessions.kept.stored_sessions import check_named, wrong_in
 from tactileq.experiments.sessions.kept.tables import GrowingTable
 from tactileq.experiments.sessions.kept.traces import (
     HAND_COLUMNS,
@@ -73,7 +82,7 @@ class SessionStore:
         self, files: SessionFiles, manifest: SessionManifest, *, handle: int, lock: Lock
     ) -> None:
         self.files, self.manifest, self._lock = files, manifest, lock
-        self._began_s = time.monotonic()
+        self._began_utc, self._began_s = utc_text(), time.monotonic()
         self._tables: list[GrowingTable] = []
         self._opened = False
         try:
@@ -145,7 +154,13 @@ class SessionStore:
         handle = open_file(files.log, new=True)
         sync_folder(files.folder)
         store = cls(files, manifest, handle=handle, lock=lock)
-        store._open({"resumed": False, "overrides": manifest.overrides})
+        try:
+            store._open({"resumed": False, "overrides": manifest.overrides})
+            read_log(files.log)  # what could not be read later does not begin
+        except BaseException:
+            with suppress(StoreError):
+                store.close()
+            raise
         return store
 
     @classmethod
@@ -190,11 +205,12 @@ class SessionStore:
                 store = cls(files, stored, handle=handle, lock=lock)
                 try:
                     _check_open(store.before, stored, files=files)
-                except InputError:
-                    store.close()
+                    now = {"changed": _changes(stored, manifest), "overrides": overrides.recorded}
+                    store._open({"resumed": True, **now})
+                except BaseException:
+                    with suppress(StoreError):
+                        store.close()
                     raise
-                changed = {"changed": _changes(stored, manifest), "overrides": overrides.recorded}
-                store._open({"resumed": True, **changed})
         except StoreError:
             raise
         except OSError as error:
@@ -204,13 +220,8 @@ class SessionStore:
     def _open(self, fields: Mapping[str, object]) -> None:
         cut = {"cut": self._cut.decode("utf-8", "backslashreplace")} if self._cut else {}
         sha256 = self.manifest.sha256
-        try:
-            event = {"manifest_sha256": sha256, **fields, **cut}
-            self._writer.put_safely(self._event("opened", event))
-        except BaseException:
-            with suppress(StoreError):
-                self.close()
-            raise
+        event = {"manifest_sha256": sha256, **fields, **cut}
+        self._writer.put_safely(self._event("opened", event))
         self._opened = True
 
     @property
@@ -223,7 +234,15 @@ class SessionStore:
         self._writer.put(self._event(event, fields))
 
     def answer(self, trial: int, row: Mapping[str, object]) -> None:
-        """See `Store.answer`."""
+        """See `Store.answer`.
+
+        Raises
+        ------
+        ValueError
+            For an answer that could not be read again: written, it would cost the whole session.
+        """
+        if wrong := wrong_in(plain(row), self.files.task):
+            raise ValueError(f"expected an answer that can be read again, got {wrong}")
         self._writer.put_safely(self._event("answer", {"trial": trial, "row": dict(row)}))
 
     def finish(self, status: str, reason: str = "", *, by: str = "") -> None:
@@ -239,7 +258,12 @@ class SessionStore:
         if not fields.keys().isdisjoint(OWN_FIELDS):
             raise TypeError(f"{event}: {', '.join(OWN_FIELDS)} are reserved names of the log")
         t_s = round(time.monotonic() - self._began_s, 6)
-        return {"utc": utc_text(), "t_s": t_s, "run": self.run, "event": event, **fields}
+        utc = utc_text()
+        if not is_time(utc):  # the clock was set meanwhile, which would cost all answers so far
+            utc = utc_text(datetime.fromisoformat(self._began_utc) + timedelta(seconds=t_s))
+        values = {"utc": utc, "t_s": t_s, "run": self.run, "event": event, **fields}
+        check_event(values)
+        return values
 
     def trace(
         self,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import stat
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -231,3 +232,17 @@ def test_a_caller_that_goes_elsewhere_meanwhile_moves_nothing(
         (fresh / "a").write_text("1")
     assert (home / "made" / "a").read_text() == "1"
     assert list(elsewhere.iterdir()) == []
+
+
+@pytest.mark.parametrize("mask", [0o002, 0o022, 0o077])
+def test_the_mask_says_who_may_read_and_write(target: Path, mask: int) -> None:
+    target.parent.chmod(0o2755)
+    before = os.umask(mask)
+    try:
+        another_run(target)
+        write_files({target / "b": b"beside"})
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE(target.stat().st_mode) == 0o2000 | 0o777 & ~mask  # its group is that above
+    for path in (target / "a", target / "b"):
+        assert stat.S_IMODE(path.stat().st_mode) == 0o666 & ~mask

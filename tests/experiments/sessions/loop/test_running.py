@@ -5,9 +5,11 @@ from __future__ import annotations
 import errno
 import os
 import signal
+import stat
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +17,12 @@ import numpy as np
 import pytest
 
 from tactileq.experiments.sessions.bids.export import export_all, export_session
-from tactileq.experiments.sessions.kept import program
+from tactileq.experiments.sessions.kept import log, program
 from tactileq.experiments.sessions.kept.log import read_log
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
 from tactileq.experiments.sessions.kept.roster import Roster
 from tactileq.experiments.sessions.kept.state import session_state
+from tactileq.experiments.sessions.kept.stored_sessions import held_sessions
 from tactileq.experiments.sessions.kept.writer import StoreError
 from tactileq.experiments.sessions.loop.people import (
     ConsentRefused,
@@ -30,8 +33,10 @@ from tactileq.experiments.sessions.loop.people import (
 from tactileq.experiments.sessions.loop.running import Circumstances, run_session
 from tactileq.experiments.sessions.loop.surfaces import Surfaces
 from tactileq.experiments.sessions.loop.trial_loop import People, SessionResult
+from tactileq.experiments.sessions.store import admission
 from tactileq.experiments.sessions.store.session_store import SessionStore
 from tactileq.experiments.sessions.store.status import study_progress
+from tactileq.experiments.sessions.store.withdrawing import withdraw
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.questions import Question
 from tactileq.experiments.study.study import Consent, Study
@@ -497,6 +502,92 @@ def test_another_consent_is_asked_for_again(run: Callable[..., Any], small: Stud
         override="the ethics committee asked for another form",
     )
     assert not again.asked[0].known
+
+
+def set_clock(moment: datetime, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in (log, admission):
+        monkeypatch.setattr(module, "now_utc", lambda: moment)
+
+
+@pytest.mark.parametrize("year", [1970, 1999, 2200])
+def test_no_session_begins_by_a_clock_whose_times_cannot_be_read(
+    run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, year: int
+) -> None:
+    set_clock(datetime(year, 7, 1, tzinfo=UTC), monkeypatch)
+    with refused(InputError, expected=["2000", "2199"], got=str(year)):
+        run()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_clock_that_was_set_back_is_told_and_what_it_stores_can_be_read(
+    run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+    set_clock(datetime(2026, 7, 1, tzinfo=UTC), monkeypatch)
+    run(tell=told.append)
+    set_clock(datetime(2026, 6, 30, tzinfo=UTC), monkeypatch)
+    run(subject=2, tell=told.append)
+    (sentence,) = told
+    assert "2026-06-30" in sentence
+    assert "2026-07-01" in sentence
+    held, damaged = held_sessions(tmp_path)
+    assert (len(held), damaged) == (2, [])
+
+
+@pytest.mark.parametrize("year", [1999, 2200])
+def test_a_clock_that_is_set_during_a_session_costs_no_answer(
+    run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, year: int
+) -> None:
+    class Resets(Scripted):
+        def wait(self, until: Callable[[], bool]) -> None:
+            if self.answered == 2:
+                set_clock(datetime(year, 7, 1, tzinfo=UTC), monkeypatch)
+
+    set_clock(datetime(2026, 7, 1, tzinfo=UTC), monkeypatch)
+    result, manifest = run(Resets())
+    assert result.completed
+    ((held,), damaged) = held_sessions(tmp_path)
+    assert damaged == []
+    assert len(held.state.rows) == TRIALS
+    assert {event["utc"][:10] for event in held.state.events} == {"2026-07-01"}
+
+
+def test_an_answer_that_could_not_be_read_again_is_not_written(
+    run: Callable[..., Any], tmp_path: Path
+) -> None:
+    class Wrong(Scripted):
+        def rate(self, trial: Any, surfaces: Any) -> Rating:
+            rating = super().rate(trial, surfaces)
+            return replace(rating, response_time_s=-1.0) if self.answered == 3 else rating
+
+    with pytest.raises(ValueError, match="response_time_s"):
+        run(Wrong())
+    ((held,), damaged) = held_sessions(tmp_path)
+    assert (held.state.status, len(held.state.rows), damaged) == ("crashed", 2, [])
+    assert run(resume=True)[0].completed
+
+
+@pytest.mark.parametrize("mask", [0o002, 0o022, 0o077])
+def test_who_may_go_on_with_a_data_set_is_for_the_mask_and_the_folder_to_say(
+    run: Callable[..., Any], small: Study, tmp_path: Path, mask: int
+) -> None:
+    data = tmp_path / "data"
+    data.mkdir()
+    data.chmod(0o2777 & ~mask)  # what is made in it is of its group
+    before = os.umask(mask)
+    try:
+        run(Tired(2), folder=data)
+        run(folder=data, resume=True)
+        run(folder=data, subject=2)
+        export_all(data)
+        withdraw(data, 2)
+    finally:
+        os.umask(before)
+    modes = {path: stat.S_IMODE(path.stat().st_mode) for path in data.rglob("*")}
+    assert len(modes) > 20
+    wrong = {p: m for p, m in modes.items() if m & 0o777 != (0o777 if p.is_dir() else 0o666) & ~mask}
+    assert wrong == {}
+    assert all(mode & stat.S_ISGID for path, mode in modes.items() if path.is_dir())
 
 
 class Refuses(Scripted):

@@ -28,6 +28,7 @@ from tactileq.experiments.sessions.store.session_store import SessionStore
 from tactileq.modeling import InputError
 from tactileq.modeling.files.hashes import sha256_of_values
 from tactileq.rig.shared.interface import HandRows, PresentationRecord
+from tests.experiments.scripted import rated
 
 CALLS = ("write", "fsync", "replace", "ftruncate", "mkdir", "open")
 ROWS = HandRows(
@@ -82,10 +83,7 @@ def run(folder, tell, resumed=False):
             store.log("mount_requested", trial=number, tray="C")
             store.log("presented", trial=number, surface="real")
             store.log("slider", trial=number, scale="magnitude", value=10.0 * number)
-            store.answer(
-                number,
-                {"trial": number, "value": 10.0 * number, "valid": True, "repeats": None},
-            )
+            store.answer(number, rated(number, magnitude_similarity=10.0 * number))
             tell(f"answer {number}")
             store.trace(number, ROWS, presentations=[SHOWN], faults=())
         store.finish("complete")
@@ -174,7 +172,7 @@ def race(root):
                 with Roster(root / "data").enrolling(subject, 4):
                     store = SessionStore.create(root / "data", manifest(subject))
                 with store:
-                    store.answer(1, {"trial": 1, "valid": True})
+                    store.answer(1, rated(1))
                     time.sleep(0.3)
                     store.finish("complete")
                 tell("ran")

@@ -35,6 +35,7 @@ from tactileq.modeling import InputError
 from tactileq.modeling.files.columns import Column
 from tactileq.modeling.files.reading import reason_of
 from tactileq.rig.shared.interface import Acceleration, HandRows, PresentationRecord
+from tests.experiments.scripted import rated
 from tests.refusals import check_refusal, refused
 
 FileSizeLimit = Callable[[int], AbstractContextManager[None]]
@@ -51,17 +52,13 @@ def manifest(manifest_of: ManifestOf) -> SessionManifest:
     return manifest_of()
 
 
-def row_of(trial: int, **more: object) -> dict[str, object]:
-    return {"trial": trial, "valid": True, "repeats": None, **more}
-
-
 def contents(folder: Path) -> dict[Path, bytes]:
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def completed(folder: Path, manifest: SessionManifest) -> SessionFiles:
     with SessionStore.create(folder, manifest) as store:
-        store.answer(1, row_of(1))
+        store.answer(1, rated(1))
         store.finish("complete")
         return store.files
 
@@ -74,7 +71,7 @@ def test_everything_stands_in_the_log_in_its_order(
 ) -> None:
     with SessionStore.create(tmp_path, manifest) as store:
         store.log("presented", trial=1, surface="real", start_s=np.float64(0.25))
-        store.answer(1, row_of(1, similarity=0.1 + 0.2))
+        store.answer(1, rated(1, frequency_similarity=0.1 + 0.2))
         store.log("slider", value=float("nan"))
         store.finish("aborted", "felt ill", by="participant")
     events = read_log(store.files.log).events
@@ -84,7 +81,7 @@ def test_everything_stands_in_the_log_in_its_order(
     assert [event["event"] for event in events] == names
     assert events[0]["manifest_sha256"] == SessionManifest.load(store.files.manifest).sha256
     assert events[1]["start_s"] == 0.25
-    assert events[2]["row"]["similarity"] == 0.1 + 0.2
+    assert events[2]["row"]["frequency_similarity"] == 0.1 + 0.2
     assert events[3]["value"] is None
     assert (events[4]["reason"], events[4]["by"]) == ("felt ill", "participant")
     times = [event["t_s"] for event in events]
@@ -122,7 +119,7 @@ def test_an_answer_is_forced_to_disk_when_it_has_been_taken(
         monkeypatch.setattr(os, "fsync", slow)
         for trial in (1, 2, 3):
             store.log("presented", trial=trial)
-            store.answer(trial, row_of(trial))
+            store.answer(trial, rated(trial))
             text = store.files.log.read_bytes()[: sizes[-1]].decode()
             assert f'"event": "answer", "trial": {trial}' in text
 
@@ -141,7 +138,7 @@ def test_who_logs_never_waits_for_the_disk_and_much_goes_at_once(
         for value in range(1000):
             store.log("slider", value=value)  # would wait for ever, did it wait for the disk
         stuck.set()
-        store.answer(1, row_of(1))
+        store.answer(1, rated(1))
         assert len(forced) < 1000
     events = read_log(store.files.log).events
     assert [e["value"] for e in events if e["event"] == "slider"] == list(range(1000))
@@ -149,7 +146,7 @@ def test_who_logs_never_waits_for_the_disk_and_much_goes_at_once(
 
 def test_many_threads_may_log(tmp_path: Path, manifest: SessionManifest) -> None:
     with SessionStore.create(tmp_path, manifest) as store, ThreadPoolExecutor(4) as pool:
-        list(pool.map(lambda n: store.answer(n, row_of(n)), range(40)))
+        list(pool.map(lambda n: store.answer(n, rated(n)), range(40)))
     rows = session_state(store.files.log).rows
     assert sorted(row["trial"] for row in rows) == list(range(40))
 
@@ -200,11 +197,11 @@ def test_in_memory_rows_are_kept_and_nothing_is_written() -> None:
     store: Store = memory
     with store:
         store.log("presented", trial=1)
-        store.answer(1, row_of(1))
+        store.answer(1, rated(1))
         store.trace(1, HandRows.joined([]), presentations=(), faults=())
         store.acceleration(1, ())
         store.finish("complete")
-    assert memory.rows == [row_of(1)]
+    assert memory.rows == [rated(1)]
     assert memory.status == "complete"
     assert [event["event"] for event in memory.events] == ["presented", "ended"]
 
@@ -215,7 +212,7 @@ def test_in_memory_rows_are_kept_and_nothing_is_written() -> None:
 def answer_eight(store: SessionStore, taken: list[int]) -> None:
     for trial in range(2, 9):
         store.log("presented", trial=trial)
-        store.answer(trial, row_of(trial))
+        store.answer(trial, rated(trial))
         taken.append(trial)
 
 
@@ -226,7 +223,7 @@ def test_a_full_disk_loses_nothing_that_was_safe(
     for room in range(0, 600, 23):
         folder, taken = tmp_path / str(room), [1]
         store = SessionStore.create(folder, manifest)
-        store.answer(1, row_of(1))
+        store.answer(1, rated(1))
         before = store.files.log.read_bytes()
         facts = [TOO_LARGE, "--resume"]
         with (
@@ -242,7 +239,7 @@ def test_a_full_disk_loses_nothing_that_was_safe(
         assert found.endswith(b"\n")
         assert [row["trial"] for row in session_state(store.files.log).rows] == taken
         with SessionStore.resume(folder, manifest) as store:
-            store.answer(len(taken) + 1, row_of(len(taken) + 1))
+            store.answer(len(taken) + 1, rated(len(taken) + 1))
         rows = session_state(store.files.log).rows
         assert [row["trial"] for row in rows] == [*taken, len(taken) + 1]
 
@@ -252,7 +249,7 @@ def test_a_failing_disk_is_told_at_the_answer_and_ever_after(
     tmp_path: Path, manifest: SessionManifest, monkeypatch: pytest.MonkeyPatch, call: str
 ) -> None:
     store = SessionStore.create(tmp_path, manifest)
-    store.answer(1, row_of(1))
+    store.answer(1, rated(1))
 
     def fail(*_: object) -> int:
         raise OSError(errno.EIO, "Input/output error")
@@ -260,10 +257,10 @@ def test_a_failing_disk_is_told_at_the_answer_and_ever_after(
     with monkeypatch.context() as broken:
         broken.setattr(os, call, fail)
         with refused(StoreError, expected=store.files.log, got=FAILING):
-            store.answer(2, row_of(2))
+            store.answer(2, rated(2))
     for again in (
         lambda: store.log("presented"),
-        lambda: store.answer(2, row_of(2)),
+        lambda: store.answer(2, rated(2)),
         lambda: store.finish("crashed"),
         lambda: store.close(),
     ):
@@ -319,7 +316,7 @@ def test_a_session_is_made_once_whoever_asks_at_the_same_time(
     def attempt(_: int) -> str:
         try:
             with SessionStore.create(tmp_path, manifest) as store:
-                store.answer(1, row_of(1))
+                store.answer(1, rated(1))
         except InputError as refusal:
             return str(refusal)
         return "made"
@@ -345,7 +342,7 @@ def test_what_is_being_run_is_refused_and_its_state_is_running(
         with refused(InputError, got=[STEM, os.getpid()]):
             SessionStore.resume(tmp_path, manifest)
         assert contents(tmp_path) == before
-        store.answer(1, row_of(1))
+        store.answer(1, rated(1))
     assert session_state(store.files.log).status == "crashed"
 
 
@@ -466,7 +463,7 @@ def test_what_cannot_be_resumed(tmp_path: Path, manifest: SessionManifest) -> No
 
 def test_half_a_line_is_kept_by_the_next_run(tmp_path: Path, manifest: SessionManifest) -> None:
     with SessionStore.create(tmp_path, manifest) as store:
-        store.answer(1, row_of(1))
+        store.answer(1, rated(1))
     half = line_of({"n": 4, "told": "ü"})[:-4]
     store.files.log.write_bytes(store.files.log.read_bytes() + half)
     assert session_state(store.files.log).cut

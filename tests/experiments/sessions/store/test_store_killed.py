@@ -20,6 +20,7 @@ from tactileq.experiments.sessions.kept.resume import Resumption, resumption
 from tactileq.experiments.sessions.kept.roster import Roster
 from tactileq.experiments.sessions.kept.state import session_state
 from tactileq.experiments.sessions.store.session_store import SessionStore
+from tests.experiments.scripted import rated
 from tests.experiments.sessions.store.enrolling import enrolled
 
 ManifestOf = Callable[..., SessionManifest]
@@ -64,7 +65,7 @@ def answer_rest(store: SessionStore, manifest: SessionManifest) -> Resumption:
     left = resumption(manifest, store.before, longest_gap_min=30)
     for trial in left.next_trials:
         number = trial["trial"]
-        store.answer(number, {"trial": number, "value": 10.0 * number, "valid": True})
+        store.answer(number, rated(number, magnitude_similarity=10.0 * number))
     store.finish("complete")
     return left
 
@@ -110,7 +111,7 @@ def go_on(folder: Path, manifest: SessionManifest, kept: list[int]) -> None:
 def assert_whole(files: SessionFiles) -> None:
     state = session_state(files.log)
     assert state.status == "complete"
-    assert [(row["trial"], row["value"]) for row in state.rows] == [
+    assert [(row["trial"], row["magnitude_similarity"]) for row in state.rows] == [
         (number, 10.0 * number) for number in PLANNED
     ]
     for name in ("hand.tsv", "presentations.tsv"):
@@ -173,7 +174,7 @@ def test_killed_anywhere_while_it_is_resumed(tmp_path: Path, manifest_of: Manife
     enrolled(Roster(begun), 1, 4)
     with SessionStore.create(begun, manifest) as store:
         for number in (1, 2):
-            store.answer(number, {"trial": number, "value": 10.0 * number, "valid": True})
+            store.answer(number, rated(number, magnitude_similarity=10.0 * number))
     log = files_in(begun).log
     log.write_bytes(log.read_bytes() + line_of({"n": 4, "utc": "2026"})[:-5])
     run("kill", root, begun)
