@@ -93,6 +93,9 @@ class Lock:
                     "remove it."
                 ) from None
         except BaseException:  # a signal, whose handler may raise when the lock is held already
+            if not lock.is_locked:  # or when there is only its file, which is nobody's
+                with suppress(Timeout, OSError):
+                    lock.acquire(timeout=0)
             self.release()
             raise
 

@@ -544,7 +544,7 @@ def test_a_clock_that_is_set_during_a_session_costs_no_answer(
                 set_clock(datetime(year, 7, 1, tzinfo=UTC), monkeypatch)
 
     set_clock(datetime(2026, 7, 1, tzinfo=UTC), monkeypatch)
-    result, manifest = run(Resets())
+    result, _ = run(Resets())
     assert result.completed
     ((held,), damaged) = held_sessions(tmp_path)
     assert damaged == []
@@ -585,8 +585,8 @@ def test_who_may_go_on_with_a_data_set_is_for_the_mask_and_the_folder_to_say(
         os.umask(before)
     modes = {path: stat.S_IMODE(path.stat().st_mode) for path in data.rglob("*")}
     assert len(modes) > 20
-    wrong = {p: m for p, m in modes.items() if m & 0o777 != (0o777 if p.is_dir() else 0o666) & ~mask}
-    assert wrong == {}
+    for path, mode in modes.items():
+        assert mode & 0o777 == (0o777 if path.is_dir() else 0o666) & ~mask, path
     assert all(mode & stat.S_ISGID for path, mode in modes.items() if path.is_dir())
 
 

@@ -1,6 +1,6 @@
 """Runs small sessions in processes of their own, for the tests of what survives them.
 
-    killed_session.py kill FOLDER FROM   SIGKILL before every call that changes a disk, in turn, and
+    killed_session.py kill FOLDER FROM   SIGKILL after every call that changes a disk, in turn, and
                                          in the middle of every write; from nothing, or on a copy
                                          of the data in FROM, resumed
     killed_session.py race FOLDER        eight consoles at once
@@ -14,8 +14,8 @@ import os
 import shutil
 import signal
 import sys
-import threading
 import time
+from functools import partial
 from pathlib import Path
 
 import filelock  # noqa: F401  # once, and not in each of a hundred children
@@ -29,8 +29,8 @@ from tactileq.modeling import InputError
 from tactileq.modeling.files.hashes import sha256_of_values
 from tactileq.rig.shared.interface import HandRows, PresentationRecord
 from tests.experiments.scripted import rated
+from tests.interrupting import Interrupter, forked
 
-CALLS = ("write", "fsync", "replace", "ftruncate", "mkdir", "open")
 ROWS = HandRows(
     time_s=np.array([0.1, 0.2]),
     speed_mm_s=np.array([10.0, 12.0]),
@@ -89,54 +89,17 @@ def run(folder, tell, resumed=False):
         store.finish("complete")
 
 
-class Killer:
-    """Kills the process at the k-th call that changes a disk, or halfway through it."""
-
-    def __init__(self, at, torn, tell):
-        self.at, self.torn, self.tell, self.count = at, torn, tell, 0
-        self.lock = threading.RLock()
-        self.real = {name: getattr(os, name) for name in CALLS}
-        for name in CALLS:
-            setattr(os, name, self.wrapped(name))
-
-    def wrapped(self, name):
-        def call(*arguments, **named):
-            with self.lock:
-                self.count += 1
-                last = self.count == self.at
-            if last:
-                if self.torn and name == "write":
-                    handle, data = arguments
-                    self.real["write"](handle, data[: len(data) // 2])
-                os.kill(os.getpid(), signal.SIGKILL)
-                time.sleep(60)
-            result = self.real[name](*arguments, **named)
-            if name == "fsync":
-                path = os.readlink(f"/proc/self/fd/{arguments[0]}")
-                if path.endswith(".jsonl"):
-                    self.tell(f"safe {os.fstat(arguments[0]).st_size} {Path(path).name}")
-            return result
-
-        return call
-
-
-def forked(work):
-    """What a child process that does this ends with."""
-    child = os.fork()
-    if child:
-        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    try:
-        work()
-    except BaseException as error:
-        print(repr(error), file=sys.stderr, flush=True)
-        os._exit(1)
-    os._exit(0)
-
-
 def teller(path):
     write = os.write
     handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     return lambda line: write(handle, f"{line}\n".encode())
+
+
+def tell_size(tell, handle):
+    """To which length a log was forced to disk."""
+    path = os.readlink(f"/proc/self/fd/{handle}")
+    if path.endswith(".jsonl"):
+        tell(f"safe {os.fstat(handle).st_size} {Path(path).name}")
 
 
 def kill_everywhere(root, begun):
@@ -145,13 +108,13 @@ def kill_everywhere(root, begun):
         code, at = -signal.SIGKILL, 0
         while code == -signal.SIGKILL:
             at += 1
-            name = f"{'torn' if torn else 'before'}-{at}"
+            name = f"{'torn' if torn else 'after'}-{at}"
             if begun:
                 shutil.copytree(begun, root / name)
 
             def work(at=at, torn=torn, name=name):
                 tell = teller(root / f"{name}.told")
-                Killer(at, torn, tell)
+                Interrupter(root, at=at, torn=torn, forced=partial(tell_size, tell))
                 run(root / name, tell, resumed=begun is not None)
 
             code = ended[name] = forked(work)

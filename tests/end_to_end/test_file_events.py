@@ -1,0 +1,336 @@
+"""Each command that writes, ended after each call that changes a disk; then the next one goes on.
+
+A run is recorded once, then replayed in a process of its own for each call and each signal. What a
+command writes into a hidden folder nobody else sees before it is moved: of many calls in there some
+are tried, the first and the last among them. Commands that need a device on a wire are not here.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tactileq import app
+from tactileq.experiments.sessions.bids.export import export_all
+from tactileq.experiments.sessions.kept.files import SessionFiles, sessions_in
+from tactileq.experiments.sessions.kept.roster import Roster
+from tactileq.experiments.sessions.kept.stored_sessions import held_session
+from tactileq.experiments.sessions.store.withdrawing import withdraw
+from tactileq.experiments.verification.verifying import verify_data
+from tests.end_to_end.conftest import commands
+from tests.end_to_end.test_inputs import COMMANDS, here
+from tests.experiments.verification.small_studies import (
+    Stopping,
+    run_all,
+    run_one,
+    small_models,
+    small_study,
+)
+from tests.interrupting import Interrupter, forked
+
+__all__ = ["here"]
+
+SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
+MOST_HIDDEN = 12  # of the calls in a hidden folder
+MOST = 60  # of all calls; only of a whole simulated study there are more
+SAMPLE = 6  # in make test, of each signal
+WRITE_TO = {"wav": "stiff.wav", "json": "stiff.json"}
+# What is already tried by another command of the same kind, but for what it reads.
+_ALIKE = {
+    *("a picture of recordings", "scene of a recorded hand", "stimuli of a scene"),
+    *("stimuli of a model", "simulate a scene", "simulate a scene of other models"),
+    *("chart of recordings", "import csv"),
+}
+WRITERS: dict[str, tuple[object, ...]] = {
+    **{name: words for name, words in COMMANDS.items() if name not in _ALIKE},
+    "study init": ("study", "init", "new.toml"),
+    "study status": ("study", "status", "--data", "taken"),
+    "study dropout": ("study", "dropout", 1, "--data", "taken", "--yes"),
+    "study withdraw": ("study", "withdraw", 1, "--data", "taken", "--yes"),
+}
+# In make test: what opens two stores, what is in one file, in several, and in a folder.
+SAMPLED = ("header", "import wav", "study withdraw")
+_RANDOM = re.compile(r"\.[0-9a-f]{8}\.unfinished")
+
+
+def taken(folder: Path) -> Path:
+    """A data set of two people, of whose first the tables are missing."""
+    run_all(folder / "taken", small_study(("canvas", "PVC")), small_models(("canvas", "PVC")))
+    shutil.rmtree(folder / "taken/sub-01")
+    return folder
+
+
+# --- Running --------------------------------------------------------------------------------------
+
+
+class Swept:
+    """What is run in copies of a folder: whole, and ended after one of its calls.
+
+    Parameters
+    ----------
+    before : Path
+        What is there at first.
+    work : callable
+        Done in a copy, as a process of its own; its exit code.
+    """
+
+    def __init__(self, before: Path, scratch: Path, work: Callable[[], int]) -> None:
+        self._before, self._scratch, self._work = before, scratch, work
+        self.place = scratch / "place"
+
+    def restore(self) -> None:
+        """A new copy."""
+        shutil.rmtree(self.place, ignore_errors=True)
+        shutil.copytree(self._before, self.place, symlinks=True)
+
+    def run(self, work: Callable[[], int] | None = None, **at: Any) -> tuple[int, str, list[str]]:
+        """Exit code, what was told, and the calls."""
+        told, calls = self._scratch / "told", self._scratch / "calls"
+        calls.unlink(missing_ok=True)
+
+        def child() -> int:
+            os.chdir(self.place)
+            os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+            sys.stdout = sys.stderr = told.open("w", encoding="utf-8", buffering=1)
+            interrupter = Interrupter(self.place, **at)
+            try:
+                return (work or self._work)()
+            finally:
+                calls.write_text("\n".join(interrupter.calls))
+
+        code = forked(child)
+        return code, told.read_text(), calls.read_text().split("\n") if calls.exists() else []
+
+
+def command(words: Sequence[object]) -> int:
+    """Run the command line; its exit code."""
+    sys.argv = ["tactileq", *map(str, words)]
+    sys.argv += ["--jobs", "1"] if words[0] == "model" else []
+    try:
+        app.main()
+    except SystemExit as end:
+        return int(end.code or 0)
+    return 0
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """All finished files of a folder; those of nobody's interest, locks, are left out."""
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and not any(part.startswith(".") for part in path.parts)
+    }
+
+
+def hidden(folder: Path) -> list[str]:
+    return [path.name for path in folder.rglob(".*")]
+
+
+def moments(calls: Sequence[str]) -> list[int]:
+    """After which calls a run is ended; see MOST_HIDDEN and MOST."""
+    inside = [n for n, call in enumerate(calls, 1) if ".unfinished/" in call]
+    outside = [n for n in range(1, len(calls) + 1) if n not in set(inside)]
+    return sorted({*evenly(inside, MOST_HIDDEN), *evenly(outside, MOST)})
+
+
+def evenly(places: Sequence[int], most: int) -> list[int]:
+    """As many of these, the first and the last among them."""
+    if len(places) <= most:
+        return list(places)
+    return [places[round(n * (len(places) - 1) / (most - 1))] for n in range(most)]
+
+
+def sweep(
+    swept: Swept,
+    *,
+    most: int | None = None,
+    go_on: Callable[[], int] | None = None,
+) -> dict[str, int]:
+    """End it at each moment, and let the next one go on; how often, by signal.
+
+    Then there are all files that an undisturbed run leaves, with the same bytes where those of two
+    undisturbed runs are the same.
+
+    Parameters
+    ----------
+    most : int, optional
+        Of the moments of each signal.
+    go_on : callable, optional
+        What is done next, if it is not the same again.
+    """
+    ends = []
+    for _ in range(2):
+        swept.restore()
+        code, told, calls = swept.run()
+        assert code == 0, told
+        ends.append(contents(swept.place))
+    swept.restore()
+    fixed = {name: data for name, data in ends[0].items() if ends[1].get(name) == data}
+
+    def as_wanted(place: Path) -> bool:
+        found = contents(place)
+        same = all(found[name] == data for name, data in fixed.items() if name in found)
+        return found.keys() == ends[0].keys() and same
+
+    tried: dict[str, int] = {}
+    known: set[int] = set()
+    for number in SIGNALS:
+        chosen = moments(calls)
+        for at in chosen if most is None else evenly(chosen, most):
+            swept.restore()
+            code, told, _ = swept.run(at=at, number=number)
+            where = f"{signal.Signals(number).name} after {at} of {len(calls)}: {calls[at - 1]}"
+            assert code in (0, -number, 128 + number), f"{where}: {told}"
+            if number != signal.SIGKILL:
+                assert not hidden(swept.place), where
+            tried[signal.Signals(number).name] = tried.get(signal.Signals(number).name, 0) + 1
+            state = state_of(swept.place)
+            if state in known:  # the next one cannot tell
+                continue
+            known.add(state)
+            done = as_wanted(swept.place)
+            code, told, _ = swept.run(go_on)
+            assert code == 0 or done, f"{where}, then: {told}"  # some refuse what is done already
+            assert not hidden(swept.place), where
+            assert as_wanted(swept.place), where
+    return tried
+
+
+def state_of(place: Path) -> int:
+    """All names and bytes of a folder, but for random parts of hidden names."""
+    return hash(
+        tuple(
+            sorted(
+                (
+                    _RANDOM.sub(".unfinished", path.relative_to(place).as_posix()),
+                    path.read_bytes() if path.is_file() else b"",
+                )
+                for path in place.rglob("*")
+            )
+        )
+    )
+
+
+# --- Commands -------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def swept_command(
+    request: pytest.FixtureRequest,
+    here: Path,
+    once_per_run: Any,
+    tmp_path_factory: pytest.TempPathFactory,
+    monkeypatch: pytest.MonkeyPatch,
+    undrawn: None,
+) -> Swept:
+    shutil.copytree(once_per_run("data-of-two", taken) / "taken", here / "taken")
+    monkeypatch.setattr(app, "app", commands())
+    words = WRITERS[request.param]
+    return Swept(here, tmp_path_factory.mktemp("swept"), partial(command, words))
+
+
+def go_on_of(name: str) -> Callable[[], int] | None:
+    """What is done next where the same again is refused, as it then says."""
+    if name.startswith("study") and name != "study status":
+        return partial(again_or_refused, WRITERS[name])
+    return None
+
+
+def again_or_refused(words: Sequence[object]) -> int:
+    """The same again, which is refused where it was done already; tables are made by the status."""
+    command(words)
+    return command(WRITERS["study status"])
+
+
+@pytest.mark.parametrize("swept_command", SAMPLED, indirect=True)
+def test_a_command_that_is_ended_at_some_calls_goes_on(
+    swept_command: Swept, request: pytest.FixtureRequest
+) -> None:
+    name = request.node.callspec.params["swept_command"]
+    tried = sweep(swept_command, most=SAMPLE, go_on=go_on_of(name))
+    assert set(tried.values()) == {SAMPLE}
+
+
+@pytest.mark.long("every command that writes, ended after each call")
+@pytest.mark.timeout(7200)
+@pytest.mark.parametrize("swept_command", WRITERS, indirect=True)
+def test_a_command_that_is_ended_at_any_call_goes_on(
+    swept_command: Swept, request: pytest.FixtureRequest
+) -> None:
+    name = request.node.callspec.params["swept_command"]
+    print(name, sweep(swept_command, go_on=go_on_of(name)))
+
+
+# --- Sessions -------------------------------------------------------------------------------------
+
+TEXTURES = ("canvas", "PVC")
+FIRST = SessionFiles(root=Path("data"), task="absolute", subject=1, session=1)
+
+
+def session(*, resume: bool) -> int:
+    """One session of two people's study in the folder where this runs."""
+    run_one(Path("data"), small_study(TEXTURES), MODELS, resume=resume)
+    return 0
+
+
+MODELS = small_models(TEXTURES)
+
+
+def go_on_with_the_session() -> int:
+    """The one that was ended, then somebody new, who withdraws; all is as it was stored."""
+    export_all("data") if Path("data").exists() else None
+    begun = FIRST.manifest.exists()
+    if not begun or held_session(FIRST).state.status != "complete":
+        session(resume=begun)
+    run_one(Path("data"), small_study(TEXTURES), MODELS, subject=2)
+    withdraw("data", 2)
+    found = verify_data("data")
+    assert found.differences == (), found.differences
+    assert [files.stem for files in sessions_in("data")] == [FIRST.stem]
+    assert Roster("data").listed().damaged == ""
+    return 0
+
+
+def sweep_session(tmp_path: Path, *, resume: bool, most: int | None = None) -> dict[str, int]:
+    before = tmp_path / "before"
+    before.mkdir()
+    if resume:
+        tired = Stopping(1, after=2)
+        run_one(before / "data", small_study(TEXTURES), MODELS, respondent=tired)
+    swept = Swept(before, tmp_path, partial(session, resume=resume))
+    swept.restore()
+    code, told, calls = swept.run()
+    assert code == 0, told
+    tried: dict[str, int] = {}
+    for number in SIGNALS:
+        places = list(range(1, len(calls) + 1))
+        for at in places if most is None else evenly(places, most):
+            swept.restore()
+            swept.run(at=at, number=number)
+            code, told, _ = swept.run(go_on_with_the_session)
+            where = f"{signal.Signals(number).name} after {at} of {len(calls)}: {calls[at - 1]}"
+            assert code == 0, f"{where}, then: {told}"
+            tried[signal.Signals(number).name] = tried.get(signal.Signals(number).name, 0) + 1
+    return tried
+
+
+@pytest.mark.parametrize("resume", [False, True])
+def test_a_session_that_is_ended_at_some_calls_goes_on(tmp_path: Path, *, resume: bool) -> None:
+    tried = sweep_session(tmp_path, resume=resume, most=SAMPLE)
+    assert set(tried.values()) == {SAMPLE}
+
+
+@pytest.mark.long("a session that is ended after each call")
+@pytest.mark.timeout(7200)
+@pytest.mark.parametrize("resume", [False, True])
+def test_a_session_that_is_ended_at_any_call_goes_on(tmp_path: Path, *, resume: bool) -> None:
+    print("session", sweep_session(tmp_path, resume=resume))
