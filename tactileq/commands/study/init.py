@@ -41,7 +41,7 @@ def study_init(
     """
     from tactileq.experiments.study.study import SHIPPED_STUDY, Study
     from tactileq.modeling.files.describing import schema_text
-    from tactileq.modeling.files.writing import write_text
+    from tactileq.modeling.files.places import unfinished_file
 
     if os.path.lexists(path):
         raise ValueError(
@@ -60,9 +60,7 @@ def study_init(
     shipped = SHIPPED_STUDY.read_text(encoding="utf-8")
     text = shipped.replace("\nseed = 1 ", f"\nseed = {seed} ")
     if models is None:
-        write_text(path, text)
-        Study.load(path)
-        write_text(schema, described)
+        _write_together(path, text, schema, described)
         print(f"study file: {path}")
         print(
             "Name your textures, trays, models and people in it, then: tactileq study check", path
@@ -70,16 +68,19 @@ def study_init(
         return
     folders = (models, simplified or models.parent / "simplified")
     textures = _textures_in(folders)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_text(path, _study_with_models(text, textures, folders, beside=path.parent, seed=seed))
-    try:
-        loaded(path)
-    except ValueError:
-        path.unlink()
-        raise
-    write_text(schema, described)
+    text = _study_with_models(text, textures, folders, beside=path.parent, seed=seed)
+    with unfinished_file(path, text.encode()) as made:
+        loaded(made)
+    _write_together(path, text, schema, described)
     print(f"study file: {path}: {', '.join(textures)}")
     print(f"Write down your trays, anchors and people in it, then: tactileq study check {path}")
+
+
+def _write_together(path: Path, text: str, schema: Path, described: str) -> None:
+    """Write the study once its schema is there, which may be there without it."""
+    from tactileq.modeling.files.writing import write_files
+
+    write_files({schema: described.encode(), path: text.encode()})
 
 
 def _check_schema(path: Path, described: str) -> None:
