@@ -86,7 +86,10 @@ def publish(
         stimuli=stimuli,
         options=options,
         free_text=free_text,
-        simulated=found.manifests[0].simulated_participant,
+        textures=frozenset(name for one in found.manifests for name in one.models_sha256),
+        # Of all sessions: a data set holds those of people or of simulations, never both.
+        simulated_participants=found.manifests[0].simulated_participant,
+        simulated_rig=found.manifests[0].simulated_rig,
     )
     provenance: dict[str, Any] = {}
     with written.folder(provenance) as fresh:
