@@ -18,7 +18,7 @@ import tomlkit
 from scipy.io import wavfile
 
 from tactileq.commands.results.publishing import assemble
-from tactileq.experiments.publishing.metadata import Publication
+from tactileq.experiments.publishing.metadata import Publication, write_metadata
 from tactileq.experiments.sessions.bids.validator import bids_issues
 from tactileq.experiments.sessions.kept.program import program_facts
 from tactileq.experiments.study.publication import AuthorSection, PublicationSection
@@ -27,9 +27,10 @@ from tactileq.experiments.study.study import Study
 from tactileq.experiments.verification.verifying import verify_data
 from tactileq.modeling import InputError, RecordingSet
 from tactileq.modeling.files.hashes import sha256_of_file
+from tactileq.modeling.files.values import NameOrFile
 from tactileq.modeling.models.loading import load_models
 from tactileq.modeling.perception.verdicts import load_simplifications
-from tactileq.stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
+from tactileq.stimuli.sets.recipe import ModelEntry, Recipe, SetLevel, TrajectoryEntry
 from tactileq.stimuli.sets.writing import write_set
 from tests.experiments.verification.small_studies import (
     Person,
@@ -135,8 +136,14 @@ def stimuli_in(folder: Path, models: Path) -> dict[str, bytes]:
     """A stimulus set into which notes and other files were put; its files as they were."""
     hand = folder.with_name("hand.csv")
     hand.write_bytes(b"# " + SECRET + b"\ntime_s,speed_mm_s,force_n\n0,100,1\n0.1,200,1.5\n")
+    threshold = folder.with_name("own.tsv")
+    threshold.write_bytes(
+        b"# source: measured here\n# " + SECRET + b"\nfrequency_hz\tdisplacement_um\tby\n"
+        b"40\t3\t" + SECRET + b"\n1000\t0.3\t" + SECRET + b"\n"
+    )
     recipe = Recipe(
         name="Small",
+        level=SetLevel(mode="loudness", threshold=NameOrFile(threshold.as_posix())),
         models=(ModelEntry(models, "full"),),
         trajectories=(
             TrajectoryEntry(name="steady", speed_mm_s=100.0, force_n=1.0),
@@ -187,7 +194,7 @@ def test_nothing_comes_along_with_what_is_listed(here: Path) -> None:
         assert RecordingSet.load(archive / place) == RecordingSet.load(here / place)
         assert files_in(archive / place) == {"recordings.tsv", "0001.csv"}
     assert files_in(archive / "stimuli") == stimuli.keys()
-    for name in stimuli.keys() - {"sources/stroke.csv"}:
+    for name in stimuli.keys() - {"sources/stroke.csv", "sources/own.tsv"}:
         assert (archive / "stimuli" / name).read_bytes() == stimuli[name], name
     again = Recipe.load(archive / "stimuli/recipe.toml")
     rows = write_set(here / "again", again)
@@ -236,6 +243,18 @@ def test_a_name_of_a_file_names_nobody_either(here: Path, monkeypatch: pytest.Mo
     path.rename(path.with_name("haptics-lab-7.json"))
     with refused(InputError, got=["'haptics-lab-7'", "models/full/haptics-lab-7.json"]):
         published(here)
+
+
+def test_csv_is_guarded_and_bids_is_not(tmp_path: Path) -> None:
+    """CSV is what spreadsheets open."""
+    table = tmp_path / "archive/data/sub-01/ses-01/beh/sub-01_ses-01_task-relative_beh.tsv"
+    table.parent.mkdir(parents=True)
+    table.write_text("texture\tvalue\n=foam\t-3.2\n-wool\tn/a\n")
+    table.with_suffix(".json").write_text("{}")
+    write_metadata(tmp_path / "archive", publication(tmp_path))
+    (made,) = (tmp_path / "archive/psych-ds/data").glob("*.csv")
+    rows = [line.split(",")[3:] for line in made.read_text().splitlines()]
+    assert rows == [["texture", "value"], ["'=foam", "-3.2"], ["'-wool", ""]]
 
 
 # --- Simulated ------------------------------------------------------------------------------------
