@@ -21,6 +21,7 @@ from tactileq.experiments.publishing.archive import (
     SETS_OF_MODELS,
     STIMULI,
 )
+from tactileq.modeling.files.tables import guarded
 
 if TYPE_CHECKING:
     from tactileq.experiments.study.publication import PublicationSection
@@ -43,10 +44,12 @@ class Publication:
         A stimulus set.
     options : mapping
         Those of the analysis whose report is published.
+    textures : frozenset of str
+        Those that sessions presented, whose models are published.
     free_text : bool
         Whether what people typed is published.
-    simulated : bool
-        Whether no person took part.
+    simulated_participants, simulated_rig : bool
+        Whether no person took part, and whether nothing was played to one.
     """
 
     study: Study
@@ -54,8 +57,10 @@ class Publication:
     models: Mapping[str, Path]
     stimuli: Path | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
+    textures: frozenset[str] = frozenset()
     free_text: bool = False
-    simulated: bool = False
+    simulated_participants: bool = False
+    simulated_rig: bool = False
 
     @property
     def stated(self) -> PublicationSection:
@@ -64,10 +69,22 @@ class Publication:
         return self.study.publication
 
     @property
+    def simulated(self) -> str:
+        """What was simulated; empty where nothing was."""
+        parts = {"participants": self.simulated_participants, "rig": self.simulated_rig}
+        named = " and ".join(name for name, simulated in parts.items() if simulated)
+        return f"Simulated {named}" if named else ""
+
+    @property
+    def title(self) -> str:
+        """The study's name, behind what was simulated: catalogues show nothing else."""
+        return f"{self.simulated}: {self.study.name}" if self.simulated else self.study.name
+
+    @property
     def description(self) -> str:
-        """In one sentence."""
-        kind = "Simulated answers" if self.simulated else "Answers of participants"
-        return self.stated.description or f"{kind} of the study {self.study.name}."
+        """What the study file states, behind what was simulated, too."""
+        mark = f"{self.simulated}. " if self.simulated else ""
+        return mark + (self.stated.description or f"Answers in the study {self.study.name}.")
 
     @property
     def license(self) -> str:
@@ -75,19 +92,22 @@ class Publication:
         return self.stated.license or self.study.data_license
 
 
-def write_metadata(archive: Path, publication: Publication) -> None:
-    """All that describes an archive whose other parts are there."""
-    _write_psych_ds(archive, publication)
+def write_metadata(archive: Path, publication: Publication) -> list[Path]:
+    """All that describes an archive whose other parts are there; what was written."""
+    psych_ds = _write_psych_ds(archive, publication)
     _write_citation(archive / "CITATION.cff", publication)
     _write_json(archive / "datacite.json", _datacite(publication))
     (archive / "README.md").write_text(_readme(archive, publication), encoding="utf-8")
     _write_crate(archive, publication)
+    names = ("CITATION.cff", "datacite.json", "README.md", "ro-crate-metadata.json")
+    return [*psych_ds, *(archive / name for name in names)]
 
 
 def bids_description(publication: Publication) -> dict[str, Any]:
-    """What the description of the data set states in addition, by BIDS."""
+    """What the description of the data set states in addition, by BIDS, and its name."""
     stated = publication.stated
     values: dict[str, Any] = {
+        "Name": publication.title,
         "License": publication.license,
         "Authors": [f"{author.given} {author.family}" for author in stated.authors],
         "Keywords": list(stated.keywords),
@@ -106,10 +126,14 @@ def _answer_tables(archive: Path) -> list[Path]:
     return sorted((archive / DATA).glob("sub-*/ses-*/beh/*_beh.tsv"))
 
 
-def _write_psych_ds(archive: Path, publication: Publication) -> None:
-    """The answers as Psych-DS 1.0 wants them: CSV files that end with _data.csv, described."""
+def _write_psych_ds(archive: Path, publication: Publication) -> list[Path]:
+    """The answers as Psych-DS 1.0 wants them: CSV files that end with _data.csv, described.
+
+    CSV is what spreadsheets open, so cells are `guarded`; the BIDS tables hold values as they are.
+    """
     folder = archive / PSYCH_DS
     (folder / "data").mkdir(parents=True)
+    written = []
     variables: dict[str, str] = {}
     for table in _answer_tables(archive):
         described = json.loads(table.with_suffix(".json").read_text("utf-8"))
@@ -123,18 +147,21 @@ def _write_psych_ds(archive: Path, publication: Publication) -> None:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow([*about, *header])
             cells = [subject, session, task.removeprefix("task-")]
-            writer.writerows([*cells, *("" if cell == "n/a" else cell for cell in r)] for r in rows)
+            shown = (["" if cell == "n/a" else guarded(cell) for cell in row] for row in rows)
+            writer.writerows([*cells, *row] for row in shown)
+        written.append(target)
         variables |= dict.fromkeys(about, "")
         variables |= {
             name: described[name].get("Description", "") if name in described else ""
             for name in header
         }
+    described_by = folder / "dataset_description.json"
     _write_json(
-        folder / "dataset_description.json",
+        described_by,
         {
             "@context": "https://schema.org/",
             "@type": "Dataset",
-            "name": publication.study.name,
+            "name": publication.title,
             "description": publication.description,
             "license": publication.license,
             "author": [_person(author) for author in publication.stated.authors],
@@ -147,6 +174,7 @@ def _write_psych_ds(archive: Path, publication: Publication) -> None:
             ],
         },
     )
+    return [*written, described_by]
 
 
 def _person(author: Any) -> dict[str, Any]:
@@ -168,7 +196,8 @@ def _write_citation(path: Path, publication: Publication) -> None:
         "cff-version: 1.2.0",
         'message: "If you use these data, please cite them as below."',
         "type: dataset",
-        f"title: {quoted(publication.study.name, ensure_ascii=False)}",
+        f"title: {quoted(publication.title, ensure_ascii=False)}",
+        f"abstract: {quoted(publication.description, ensure_ascii=False)}",
         "authors:",
     ]
     for author in publication.stated.authors:
@@ -211,7 +240,7 @@ def _datacite(publication: Publication) -> dict[str, Any]:
         **({"doi": stated.doi} if stated.doi else {}),
         "types": {"resourceTypeGeneral": "Dataset", "resourceType": "Psychophysics"},
         "creators": creators,
-        "titles": [{"title": publication.study.name}],
+        "titles": [{"title": publication.title}],
         "publisher": {"name": ":unav"},
         "publicationYear": str(_today().year),
         "subjects": [{"subject": word} for word in stated.keywords],
@@ -236,7 +265,7 @@ def _write_crate(archive: Path, publication: Publication) -> None:
         from rocrate.model.person import Person
         from rocrate.rocrate import ROCrate
     crate = ROCrate()
-    crate.name = publication.study.name
+    crate.name = publication.title
     crate.description = publication.description
     crate.datePublished = _today().isoformat()
     crate.license = publication.license
@@ -264,7 +293,8 @@ _PARTS = {
     RECORDINGS: "Recordings that the report compares models with",
     REPORTED: "Models that the report states the accuracy of",
     REPORT: "Report of tactileq analyze with its tables and figures",
-    PSYCH_DS: "The answers once more, as Psych-DS",
+    PSYCH_DS: "The answers once more, as Psych-DS (text that begins with =, +, - or @ has ' before "
+    "it, since spreadsheets would calculate it)",
 }
 _FILES = {
     "README.md": "What is in this archive, and how to check it",
@@ -274,9 +304,19 @@ _FILES = {
 }
 
 
+def _program() -> str:
+    """What wrote the archive, by which it can be verified: its version and commit."""
+    from tactileq.experiments.sessions.kept.program import program_facts
+
+    facts = program_facts()
+    changed = ", with uncommitted changes" if facts["git_uncommitted"] else ""
+    revision = f" (git revision {facts['git_revision']}{changed})" if facts["git_revision"] else ""
+    return f"tactileq {facts['versions'].get('tactileq', 'of unknown version')}{revision}"
+
+
 def _readme(archive: Path, publication: Publication) -> str:
     stated = publication.stated
-    lines = [f"# {publication.study.name}", "", publication.description, ""]
+    lines = [f"# {publication.title}", "", publication.description, ""]
     lines += [f"- `{name}/`: {text}." for name, text in _PARTS.items() if (archive / name).is_dir()]
     lines += [f"- `{name}`: {text}." for name, text in _FILES.items() if name != "README.md"]
     lines += [
@@ -288,8 +328,9 @@ def _readme(archive: Path, publication: Publication) -> str:
         "",
         "Times of day, pseudonyms and free text are left out: every participant's first session "
         "begins at noon on 2000-01-01, and logs are sealed anew. `provenance.json` holds the "
-        "SHA-256 of every file and the seals of the original logs. With tactileq installed, in "
-        "this folder:",
+        "SHA-256 of every file and the seals of the original logs.",
+        "",
+        f"Written by {_program()}. With the same version installed, in this folder:",
         "",
         "    tactileq verify .",
         f"    tactileq analyze {DATA} --out again",

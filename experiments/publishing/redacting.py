@@ -5,14 +5,15 @@ docs/method/publishing.md#redacted
 
 from __future__ import annotations
 
-import shutil
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 from tactileq.experiments.sessions.bids.export import export_all
+from tactileq.experiments.sessions.bids.people import REDACTED
 from tactileq.experiments.sessions.kept.data_set import DESCRIPTION_NAME
 from tactileq.experiments.sessions.kept.log import Event, object_of, sealed_line, utc_text
 from tactileq.experiments.sessions.kept.roster import Roster, sealed_roster_line
@@ -21,7 +22,8 @@ from tactileq.modeling import InputError
 from tactileq.modeling.files.documents import dump_json, read_json_object
 from tactileq.modeling.files.hashes import sha256_of_paths
 from tactileq.modeling.files.reading import read_bytes
-from tactileq.modeling.files.writing import write_bytes, write_text
+from tactileq.modeling.files.wav import samples_only
+from tactileq.modeling.files.writing import write_bytes
 
 # When everybody's first session begins; others of the day follow after ten minutes each. At noon,
 # so that a reader's time zone does not make another day of it.
@@ -44,10 +46,16 @@ class Redacted:
         Of the original logs' last lines; empty for those that an earlier version wrote.
     secrets : tuple of str
         What must not stand anywhere in what is published: pseudonyms.
+    days : frozenset of str
+        The dates in the copy, such as 2000-01-01.
+    files : frozenset of Path
+        All that was written.
     """
 
     seals: Mapping[str, str]
     secrets: tuple[str, ...]
+    days: frozenset[str]
+    files: frozenset[Path]
 
 
 def redact(
@@ -89,24 +97,22 @@ def redact(
     *lines, _ = read_bytes(Roster(data_folder).path, "the roster").split(b"\n")
     roster = [object_of(line) for line in lines]
     begins = dict(_beginnings(held))
-    change = _Change(sources=sources, free_text=free_text)
-    new_seals: _Seals = {}
+    copies = _Copies(change=_Change(sources=sources, free_text=free_text))
     for one in _in_order(held):
         files = one.manifest.files(out)
         files.folder.mkdir(parents=True, exist_ok=True)
-        _copy_session(one, files.folder, change, begins[one.files.stem], seals=new_seals)
-    _write_roster(out, roster, new_seals)
+        copies.add(one, files.folder, begins=begins[one.files.stem])
+    copies.write(Roster(out).path, _roster(roster, copies.seals))
     description = read_json_object(data_folder / DESCRIPTION_NAME, advice="restore the file")
-    write_text(out / DESCRIPTION_NAME, dump_json({**description, **described}))
-    export_all(out)
+    text = dump_json({**description, **described, REDACTED: True})
+    copies.write(out / DESCRIPTION_NAME, text.encode())
+    shown = export_all(out)
     return Redacted(
         seals={one.files.stem: str(_last(one).get("seal", "")) for one in held},
         secrets=tuple(e["code"] for e in roster if e["event"] == "enrolled" and e["code"]),
+        days=frozenset(copies.days),
+        files=frozenset({*copies.files, *shown.new}),
     )
-
-
-# A session and a seal in its log, with the seal of the same line in the copy.
-_Seals = dict[tuple[str, str], str]
 
 
 def _last(one: StoredSession) -> Event:
@@ -124,7 +130,11 @@ def _in_order(held: Sequence[StoredSession]) -> Iterator[StoredSession]:
 
 
 def _beginnings(held: Sequence[StoredSession]) -> Iterator[tuple[str, datetime]]:
-    """When each session begins in the copy: days stay apart as they were, times of day do not."""
+    """When each session begins in the copy: days stay apart as they were, times of day do not.
+
+    Whose clock fell back begins so many days later that nothing happens before `BEGINNING`'s day:
+    logs of earlier years are none.
+    """
     by_person: dict[str, list[StoredSession]] = {}
     for one in held:
         if one.state.events:
@@ -134,9 +144,21 @@ def _beginnings(held: Sequence[StoredSession]) -> Iterator[tuple[str, datetime]]
     for sessions in by_person.values():
         in_order = sorted(sessions, key=lambda one: one.state.begun_utc)
         first = datetime.fromisoformat(in_order[0].state.begun_utc).date()
-        for place, one in enumerate(in_order):
+        on_day: Counter[timedelta] = Counter()
+        begins = {}
+        for one in in_order:
             days = datetime.fromisoformat(one.state.begun_utc).date() - first
-            yield one.files.stem, BEGINNING + days + place * _NEXT
+            begins[one.files.stem] = BEGINNING + days + on_day[days] * _NEXT
+            on_day[days] += 1
+        moments = (m for one in in_order for m in _moments(one, begins[one.files.stem]))
+        late = max(BEGINNING.date() - min(moments).date(), timedelta())
+        yield from ((stem, moment + late) for stem, moment in begins.items())
+
+
+def _moments(one: StoredSession, begins: datetime) -> list[datetime]:
+    """When each event of a session happened, in a copy that begins then."""
+    first = datetime.fromisoformat(one.state.begun_utc)
+    return [begins + (datetime.fromisoformat(e["utc"]) - first) for e in one.state.events]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,47 +207,81 @@ def published_code(subject: int) -> str:
     return f"P-{subject:03d}"
 
 
-def _copy_session(
-    one: StoredSession,
-    folder: Path,
-    change: _Change,
-    begins: datetime,
-    *,
-    seals: _Seals,
-) -> None:
-    """Manifest, log and what lies beside it; notes the new seals of all lines."""
-    manifest = folder / one.files.manifest.name
-    log = folder / one.files.log.name
-    values = read_json_object(one.files.manifest, advice="restore the file")
-    values = change.manifest(values)
-    if after := values.get("after"):
-        named = (after["session"], after["seal"])
-        values["after"] = {**after, "seal": seals.get(named, after["seal"])}  # or of who withdrew
-    write_text(manifest, dump_json(values))
-    for path in one.files.there():
-        if path not in (one.files.manifest, one.files.log):
-            shutil.copyfile(path, folder / path.name)
-    beside = sorted(path for path in folder.glob(f"{one.files.stem}_*") if path != log)
-    hashes = {Path(path).name: sha256 for path, sha256 in sha256_of_paths(beside).items()}
-    if not one.state.events:
-        return
-    first = datetime.fromisoformat(one.state.begun_utc)
-    seal, lines = "", []
-    for event in one.state.events:
-        moment = begins + (datetime.fromisoformat(event["utc"]) - first)
-        changed = {**change.event(event), "utc": utc_text(moment)}
-        if changed["event"] == "opened":
-            changed["manifest_sha256"] = hashes[manifest.name]
-        if changed["event"] == "stored":
-            changed["files"] = hashes
-        was = changed.pop("seal", "")
-        line, seal = sealed_line(changed, seal)
-        lines.append(line)
-        seals[one.files.stem, was] = seal
-    write_bytes(log, b"".join(lines))
+@dataclass(frozen=True, kw_only=True)
+class _Copies:
+    """Copies of sessions, sealed anew, and what was noted of them.
+
+    Parameters
+    ----------
+    seals : dict of (session, str) to str
+        A session and a seal in its log, with the seal of the same line in the copy.
+    """
+
+    change: _Change
+    seals: dict[tuple[str, str], str] = field(default_factory=dict)
+    days: set[str] = field(default_factory=lambda: {BEGINNING.date().isoformat()})
+    files: set[Path] = field(default_factory=set)
+
+    def write(self, path: Path, data: bytes) -> None:
+        """Write a file, and note it."""
+        write_bytes(path, data)
+        self.files.add(path)
+
+    def add(self, one: StoredSession, folder: Path, *, begins: datetime) -> None:
+        """Manifest, log and what the session wrote beside them, into a folder."""
+        manifest = folder / one.files.manifest.name
+        values = self.change.manifest(
+            read_json_object(one.files.manifest, advice="restore the file")
+        )
+        if after := values.get("after"):
+            named = (after["session"], after["seal"])
+            # or of who withdrew
+            values["after"] = {**after, "seal": self.seals.get(named, after["seal"])}
+        self.write(manifest, dump_json(values).encode())
+        beside = {path: folder / path.name for path in one.files.beside()}
+        for path, copy in beside.items():
+            self.write(copy, _content(path))
+        if one.state.events:
+            found = sha256_of_paths(sorted([manifest, *beside.values()]))
+            hashes = {Path(path).name: sha256 for path, sha256 in found.items()}
+            own = {"manifest_sha256": hashes[manifest.name], "files": hashes}
+            self.write(folder / one.files.log.name, b"".join(self._lines(one, own, begins=begins)))
+
+    def _lines(
+        self, one: StoredSession, own: Mapping[str, Any], *, begins: datetime
+    ) -> Iterator[bytes]:
+        """Those of the log; `own` are the hashes that it names."""
+        named = {"opened": "manifest_sha256", "stored": "files"}
+        seal = ""
+        for event, moment in zip(one.state.events, _moments(one, begins), strict=True):
+            self.days.add(moment.date().isoformat())
+            changed = {**self.change.event(event), "utc": utc_text(moment)}
+            if name := named.get(changed["event"]):
+                changed[name] = own[name]
+            was = changed.pop("seal", "")
+            line, seal = sealed_line(changed, seal)
+            self.seals[one.files.stem, was] = seal
+            yield line
 
 
-def _write_roster(out: Path, roster: Sequence[Event], seals: _Seals) -> None:
+def _content(path: Path) -> bytes:
+    """The bytes of a file that a session wrote; of a WAV file the samples alone.
+
+    Raises
+    ------
+    InputError
+        For a link, since what it leads to may be anybody's.
+    """
+    if path.is_symlink():
+        raise InputError(
+            f"expected a file that the session wrote at {path}, got a link to {path.readlink()}; "
+            "put the file itself there."
+        )
+    data = read_bytes(path, "a file of a session")
+    return samples_only(data, path) if path.suffix == ".wav" else data
+
+
+def _roster(roster: Sequence[Event], seals: Mapping[tuple[str, str], str]) -> bytes:
     seal, lines = "", []
     for event in roster:
         changed: dict[str, Any] = {**event, "utc": utc_text(BEGINNING)}
@@ -237,4 +293,4 @@ def _write_roster(out: Path, roster: Sequence[Event], seals: _Seals) -> None:
             changed["log_seal"] = seals.get(named, changed["log_seal"])  # or of who withdrew
         line, seal = sealed_roster_line(changed, seal)
         lines.append(line)
-    write_bytes(Roster(out).path, b"".join(lines))
+    return b"".join(lines)

@@ -13,14 +13,18 @@ from tactileq.modeling.files.columns import Column, Value, names
 from tactileq.modeling.files.reading import read_text
 from tactileq.modeling.files.writing import write_text
 
-# A spreadsheet would calculate what begins so, whatever it names.
-_FORMULA = re.compile(r"'*[=+@]")
+# A spreadsheet would calculate what begins so, whatever it names; a number or a lone dash stays.
+_FORMULA = re.compile(r"'*(?:[=+@]|-(?!(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf)?\Z))")
 
 Row = dict[str, Value]
 
 
 def guarded(cell: str) -> str:
-    """A cell that spreadsheets do not read as a formula: with ' before a leading =, + or @."""
+    """A cell that spreadsheets do not read as a formula: with ' before a leading =, +, - or @.
+
+    For tables that people open. Those that other programs compare with a description, as of BIDS,
+    hold values as they are (docs/data.md).
+    """
     return f"'{cell}" if _FORMULA.match(cell) else cell
 
 
@@ -92,8 +96,8 @@ def read_table(
     delimiter : str
         A comma: of a CSV, in which cells may be quoted.
     bids : bool
-        Cells may be quoted as in CSV, and every line is a row; else lines that are empty or begin
-        with # are none.
+        Cells may be quoted as in CSV, hold values as they are, and every line is a row; else they
+        are `guarded`, and lines that are empty or begin with # are none.
     only : bool
         Whether columns that are not declared are refused; else those that are nearly an optional
         one that is not there, which would be ignored silently.
@@ -163,10 +167,25 @@ def read_cells(
                 f"expected {len(header)} cells in {where}, got {len(cells)}; {advice}, since the "
                 f"table is damaged or not separated by {_SEPARATORS[delimiter]}."
             )
+    value = str if bids else unguarded
     return [
-        (where, dict(zip(header, map(unguarded, cells), strict=True)))
+        (where, dict(zip(header, map(value, cells), strict=True)))
         for where, cells in split_lines[1:]
     ]
+
+
+def declared_text(path: Path, columns: Sequence[Column], *, delimiter: str = "\t") -> str:
+    """The declared columns of a table of numbers as they are, without comments and other columns.
+
+    Raises
+    ------
+    InputError
+        As `read_cells`.
+    """
+    rows = [cells for _, cells in read_cells(path, columns, delimiter=delimiter)]
+    known = [name for name in names(columns) if rows and name in rows[0]]
+    lines = [known, *([row[name] for name in known] for row in rows)]
+    return "".join(delimiter.join(line) + "\n" for line in lines)
 
 
 def _plain_cells(line: str, _: str, *, delimiter: str) -> list[str]:

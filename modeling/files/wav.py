@@ -10,6 +10,8 @@ from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import InputError
 from tactileq.modeling.files.reading import check_file
 
+# What a WAV file needs to be one; `fact`, the number of samples, beside floats.
+_NEEDED = {b"fmt ": 40, b"fact": 4, b"data": None}
 # The first bytes of sound files. In others libsndfile would look for MP3 and report it on stderr.
 _FORMS = (b"RIFF", b"RIFX", b"RF64", b"riff", b"FORM", b"fLaC")
 
@@ -84,3 +86,37 @@ def read_wav_channels(path: Path) -> tuple[Floats, float]:
             f"{path.stat().st_size}; the file is truncated, copy or record it again."
         )
     return samples, float(rate_hz)
+
+
+def samples_only(data: bytes, path: Path) -> bytes:
+    """A WAV file's format and samples, without what else it says: names, places, dates, pictures.
+
+    A file that holds nothing else stays as it is.
+
+    Parameters
+    ----------
+    data : bytes
+        The whole file.
+    path : Path
+        Its place, for the message.
+
+    Raises
+    ------
+    InputError
+        If it is no RIFF/WAVE file with a format and samples.
+    """
+    kept, at = {}, 12
+    if data[:4] == b"RIFF" and data[8:12] == b"WAVE":
+        while at + 8 <= len(data) and b"data" not in kept:
+            name, size = data[at : at + 4], int.from_bytes(data[at + 4 : at + 8], "little")
+            if name in _NEEDED:
+                kept[name] = data[at + 8 : at + 8 + size][: _NEEDED[name]]
+            at += 8 + size + size % 2
+    if not (kept.get(b"fmt ") and kept.get(b"data")):
+        raise InputError(
+            f"expected a WAV file (RIFF) with a format and samples at {path}, got something else; "
+            "convert it."
+        )
+    chunks = (n + len(c).to_bytes(4, "little") + c + bytes(len(c) % 2) for n, c in kept.items())
+    body = b"WAVE" + b"".join(chunks)
+    return b"RIFF" + len(body).to_bytes(4, "little") + body

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -73,8 +73,10 @@ def measured(vibration: Floats, rate_hz: float, *, written: Floats) -> dict[str,
     }
 
 
-def write_manifest(folder: Path, stimuli: Sequence[StimulusRow]) -> None:
+def write_manifest(folder: Path, rows: Iterable[Mapping[str, object]]) -> tuple[Path, Path]:
     """Write `manifest.tsv`, and `manifest.json` with what each column means."""
-    write_table(folder / MANIFEST, STIMULUS_COLUMNS, map(vars, stimuli))
+    table, described = folder / MANIFEST, folder / COLUMNS_FILE
+    write_table(table, STIMULUS_COLUMNS, rows)
     meanings = {column.name: column.description for column in STIMULUS_COLUMNS}
-    write_text(folder / COLUMNS_FILE, json.dumps(meanings, indent=2) + "\n")
+    write_text(described, json.dumps(meanings, indent=2) + "\n")
+    return table, described

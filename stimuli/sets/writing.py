@@ -150,7 +150,7 @@ def write_set(
                 if progress:
                     progress(stimulus.file)
             check_clipping(stimuli)
-            write_manifest(fresh, stimuli)
+            write_manifest(fresh, map(vars, stimuli))
             if finish:
                 finish(fresh)
     except OSError as error:

@@ -11,11 +11,13 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from tactileq.experiments.sessions.bids.tables import json_bytes, table_bytes
+from tactileq.experiments.sessions.bids.tables import cell, json_bytes, table_bytes
 from tactileq.experiments.sessions.kept.stored_sessions import StoredSession
 from tactileq.modeling.files.answer_tables import ANSWER_TABLES, PARTICIPANT_COLUMNS, PARTICIPANT_ID
 from tactileq.modeling.files.columns import Column, sidecar
 
+# In the description of a data set: whether its source data identify nobody any more.
+REDACTED = "Redacted"
 STATUS_LEVELS = {
     "complete": "all trials were answered",
     "aborted": "somebody ended it; it can be resumed",
@@ -115,7 +117,8 @@ def _questions(sessions: Iterable[StoredSession]) -> Iterable[Column]:
                 name,
                 unit="year" if name == "age" else "",
                 description=question.get("text", {}).get("en", name.replace("_", " ")),
-                levels=dict(zip(levels, english, strict=True)) if levels else {},
+                # As they stand in cells: validators compare these with them, quotes and all.
+                levels=dict(zip(map(cell, levels), english, strict=True)) if levels else {},
             )
             columns.setdefault(name, column)
     return columns.values()
@@ -158,7 +161,15 @@ def _session_rows(sessions: Sequence[StoredSession]) -> list[dict[str, object]]:
 
 
 def readme(description: Mapping[str, Any]) -> bytes:
-    """The README of the data set."""
+    """The README of the data set; that of a copy which is `REDACTED` is read by others."""
+    # Where studies run, the text stays as it is: data sets are compared with it, byte by byte.
+    closing = (
+        "Cells hold values as they are: let a spreadsheet import all columns as text, or it "
+        "calculates some.\n\nsourcedata holds no pseudonyms, dates or times of day; tactileq "
+        "verify needs it."
+        if description.get(REDACTED)
+        else "sourcedata holds pseudonyms, dates and times: leave it out of what you publish."
+    )
     simulated = (
         "\nTHESE DATA ARE SIMULATED: dataset_description.json says which parts.\n"
         if description.get("Simulated")
@@ -181,5 +192,5 @@ from it
 Every column is described in the JSON file beside its table. n/a means that there is no value. Text
 with quotes is written as in CSV; control characters are replaced by their symbols.
 
-sourcedata holds pseudonyms, dates and times: leave it out of what you publish.
+{closing}
 """.encode()

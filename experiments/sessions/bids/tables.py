@@ -12,7 +12,6 @@ from functools import lru_cache
 from typing import Any
 
 from tactileq.modeling.files.columns import Column, names
-from tactileq.modeling.files.tables import guarded
 
 MISSING = "n/a"
 # A table of BIDS has one line for a row, so neither a tab nor a line end can stand in a cell: they
@@ -24,8 +23,8 @@ def cell(value: object) -> str:
     """A value as one cell: n/a for nothing and NaN, true or false, ten digits of a number.
 
     Text that holds a quote is put in quotes and its quotes are doubled, as in CSV; readers of CSV
-    get it back as it was. Control characters become their pictures. What a spreadsheet would
-    calculate has ' before it (`tactileq.modeling.files.tables.guarded`).
+    get it back as it was. Control characters become their pictures. Nothing is put before what a
+    spreadsheet would calculate: programs compare cells with the levels in the sidecar.
     """
     if isinstance(value, str):
         return _text_cell(value)
@@ -44,7 +43,7 @@ def cell(value: object) -> str:
 def _text_cell(text: str) -> str:
     if not text:
         return MISSING
-    text = guarded(text).translate(_PICTURES).encode("utf-8", "backslashreplace").decode("utf-8")
+    text = text.translate(_PICTURES).encode("utf-8", "backslashreplace").decode("utf-8")
     return '"' + text.replace('"', '""') + '"' if '"' in text else text
 
 

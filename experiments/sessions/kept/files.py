@@ -14,6 +14,8 @@ from tactileq.modeling.files.places import LOCK_NAME
 from tactileq.modeling.files.reading import LONGEST_PATH
 from tactileq.modeling.files.writing import write_bytes
 
+# Endings of what a session writes beside its manifest and its log.
+_BESIDE = re.compile(r"(?:hand|presentations)\.(?:tsv|json)|trial-\d{3,}_pen-\d+\.wav")
 _MANIFEST = re.compile(r"sub-(\d+)_ses-(\d+)_task-([A-Za-z]+)_manifest\.json")
 
 
@@ -86,6 +88,11 @@ class SessionFiles:
     def there(self) -> list[Path]:
         """All of them that are there."""
         return sorted(self.folder.glob(f"{self.stem}_*"))
+
+    def beside(self) -> list[Path]:
+        """Those beside manifest and log that are there and that sessions write; no others'."""
+        start = len(self.stem) + 1
+        return [path for path in self.there() if _BESIDE.fullmatch(path.name[start:])]
 
     @staticmethod
     def of_manifest(path: Path) -> SessionFiles | None:

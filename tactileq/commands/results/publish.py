@@ -37,9 +37,10 @@ def publish(
 ) -> None:
     """Write data, plan, models, report and metadata into one folder that can be given to others.
 
-    Data are verified first. Times of day, pseudonyms and free text are left out; the copy's logs
-    are sealed anew, and the seals of the original are stated. The report is made from the copy.
-    BIDS errors, and files that would identify a participant or a machine, stop it. In the archive,
+    Data are verified first. Only what sessions, sets and the study list is written, anew. Times of
+    day, pseudonyms and free text are left out; the copy's logs are sealed anew, and the seals of
+    the original are stated. The report is made from the copy. BIDS errors, files that nothing
+    lists, and files that would identify a participant or a machine, stop it. In the archive,
     tactileq verify . checks every file, the data and the report. Needs the extra publish.
 
     Example: tactileq publish data --study study.toml --out archive
@@ -86,7 +87,10 @@ def publish(
         stimuli=stimuli,
         options=options,
         free_text=free_text,
-        simulated=found.manifests[0].simulated_participant,
+        textures=frozenset(name for one in found.manifests for name in one.models_sha256),
+        # Of all sessions: a data set holds those of people or of simulations, never both.
+        simulated_participants=found.manifests[0].simulated_participant,
+        simulated_rig=found.manifests[0].simulated_rig,
     )
     provenance: dict[str, Any] = {}
     with written.folder(provenance) as fresh:

@@ -11,8 +11,7 @@ import io
 import os
 import platform
 import re
-import shutil
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +27,7 @@ from tactileq.experiments.publishing.archive import (
 from tactileq.experiments.publishing.metadata import Publication, bids_description, write_metadata
 
 if TYPE_CHECKING:
+    from tactileq.experiments.publishing.redacting import Redacted
     from tactileq.experiments.sessions.kept.manifest import SessionManifest
     from tactileq.experiments.study.study import Study
 
@@ -37,8 +37,7 @@ _FORBIDS = re.compile(
     r"all rights reserved|proprietary|confidential",
     re.IGNORECASE,
 )
-_MOMENT = re.compile(rb"\d{4}-\d\d-\d\dT\d\d:\d\d")
-_MOMENT_OF_COPIES = re.compile(rb"2000-\d\d-\d\dT")
+_MOMENT = re.compile(rb"(\d{4}-\d\d-\d\d)T\d\d:\d\d")
 _SHORTEST_SECRET = 4  # shorter names of hosts and people stand in many words by chance
 _SAY_NOTHING = ("root", "user", "admin", "runner", "localhost")
 
@@ -116,8 +115,10 @@ def assemble(archive: Path, publication: Publication, *, analyze: Any) -> dict[s
     Raises
     ------
     InputError
-        For what a part refuses, and for a file that would identify somebody.
+        For what a part refuses, for a file that no part lists, and for one that would identify
+        somebody.
     """
+    from tactileq.commands.results.published_parts import write_models, write_stimuli
     from tactileq.experiments.publishing.redacting import redact
 
     stated = publication.stated
@@ -129,52 +130,51 @@ def assemble(archive: Path, publication: Publication, *, analyze: Any) -> dict[s
         described=bids_description(publication),
         free_text=publication.free_text,
     )
+    listed = set(redacted.files)
     for name, place in publication.models.items():
-        _copy(place, archive / SETS_OF_MODELS / name, endings=(".json",))
+        target = archive / SETS_OF_MODELS / name
+        listed |= {*write_models(place, target, textures=publication.textures)}
     if publication.stimuli is not None:
-        _copy(publication.stimuli, archive / STIMULI)
-    _write_study(archive / "study.toml", publication.study)
-    _analyze(archive, publication.options, analyze)
-    write_metadata(archive, publication)
-    _require_nobody_named(archive, redacted.secrets, data=publication.data)
+        listed |= {*write_stimuli(publication.stimuli, archive / STIMULI)}
+    listed |= {_write_study(archive / "study.toml", publication.study)}
+    listed |= {*_analyze(archive, publication, analyze)}
+    listed |= {*write_metadata(archive, publication)}
+    _require_listed(archive, listed)
+    _require_nobody_named(archive, redacted, data=publication.data)
     return {
-        "title": publication.study.name,
+        "title": publication.title,
         "authors": [f"{author.family}, {author.given}" for author in stated.authors],
         "original_seals": dict(redacted.seals),
     }
 
 
-def _copy(place: Path, target: Path, endings: tuple[str, ...] = ("",)) -> None:
-    """A folder's files with these endings, without notes on where they come from."""
-    from tactileq.modeling.files.provenance import PROVENANCE_NAME
-
-    for path in sorted(place.rglob("*")):
-        named = path.name.endswith(endings) and not path.name.endswith(PROVENANCE_NAME)
-        if path.is_file() and named:
-            new = target / path.relative_to(place)
-            new.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(path, new)
-
-
-def _write_study(path: Path, study: Study) -> None:
+def _write_study(path: Path, study: Study) -> Path:
+    """A study file with what was read of it: no comments."""
     import tomlkit
 
     path.write_text(tomlkit.dumps(study.to_tables()), encoding="utf-8")
+    return path
 
 
-def _analyze(archive: Path, options: Mapping[str, Any], analyze: Any) -> None:
-    """The report of the archive's own data, with the options of the original one."""
+def _analyze(archive: Path, publication: Publication, analyze: Any) -> Iterator[Path]:
+    """The report of the archive's own data, with the options of the original one; its files."""
+    from tactileq.commands.results.published_parts import write_models, write_recordings
+    from tactileq.experiments.study.study import Study
+    from tactileq.modeling.files.documents import read_json_object
+    from tactileq.modeling.files.provenance import PROVENANCE_NAME
+
+    options, textures = publication.options, publication.textures
     kept = {name: options.get(name) for name in ("exclude", "validate", "unverified")}
     places: dict[str, Path] = {}
     if recordings := options.get("recordings"):
-        _copy(Path(recordings), archive / RECORDINGS)
         places = {"recordings": Path(RECORDINGS)}
+        yield from write_recordings(Path(recordings), archive / RECORDINGS, textures=textures)
         for name in ("models", "simplified"):
-            _copy(Path(options[name]), archive / REPORTED / name, endings=(".json",))
             places[name] = Path(REPORTED) / name
+            yield from write_models(Path(options[name]), archive / places[name], textures=textures)
     if later := options.get("plan"):
-        shutil.copyfile(later, archive / "later_plan.toml")
         places["plan"] = Path("later_plan.toml")
+        yield _write_study(archive / places["plan"], Study.load(later))
     said = io.StringIO()
     with contextlib.chdir(archive), contextlib.redirect_stdout(said):
         analyze(
@@ -185,9 +185,32 @@ def _analyze(archive: Path, options: Mapping[str, Any], analyze: Any) -> None:
             **places,
             **kept,
         )
+    note = archive / REPORT / PROVENANCE_NAME
+    names = read_json_object(note, advice="analyze again")["files"]
+    yield from (note, *(archive / REPORT / name for name in names))
 
 
-def _require_nobody_named(archive: Path, secrets: Sequence[str], *, data: Path) -> None:
+def _require_listed(archive: Path, listed: Collection[Path]) -> None:
+    """Refuse to publish a file that no part of the archive lists, or a link.
+
+    Raises
+    ------
+    InputError
+        Naming the first one.
+    """
+    from tactileq.modeling import InputError
+
+    for path in sorted(archive.rglob("*")):
+        is_link = path.is_symlink()
+        if is_link or (path not in listed and not path.is_dir()):
+            got = f"a link to {path.readlink()}" if is_link else "one that nothing lists"
+            raise InputError(
+                f"expected only files that a part of the archive lists, got {got} at "
+                f"{path.relative_to(archive)}; find out what put it there, and publish again."
+            )
+
+
+def _require_nobody_named(archive: Path, redacted: Redacted, *, data: Path) -> None:
     """Refuse to publish a file in which a pseudonym, a host, a user or a time of day stands.
 
     Raises
@@ -198,13 +221,14 @@ def _require_nobody_named(archive: Path, secrets: Sequence[str], *, data: Path) 
     from tactileq.modeling import InputError
 
     for path, content in _contents(archive):
-        found = next((word for word in _telling(secrets, data) if word.encode() in content), "")
+        telling = _telling(redacted.secrets, data)
+        found = next((word for word in telling if word.encode() in content), "")
         what = f"{found!r}"
         if not found and path.parts[0] in (DATA, PSYCH_DS):
-            moments = (m for m in _MOMENT.finditer(content))
-            real = (m for m in moments if not _MOMENT_OF_COPIES.match(content, m.start()))
+            moments = _MOMENT.finditer(content)
+            real = (m for m in moments if m[1].decode() not in redacted.days)
             if (first := next(real, None)) is not None:
-                found = what = f"the time {first.group().decode()}"
+                found = what = f"the time {first[0].decode()}"
         if found:
             raise InputError(
                 f"expected nothing that identifies a participant or a machine, got {what} in "
@@ -224,6 +248,8 @@ def _telling(secrets: Sequence[str], data: Path) -> Iterator[str]:
 
 
 def _contents(archive: Path) -> Iterator[tuple[Path, bytes]]:
+    """Each file, its name before what it holds: both are published."""
     for path in sorted(archive.rglob("*")):
         if path.is_file():
-            yield path.relative_to(archive), path.read_bytes()
+            name = path.relative_to(archive)
+            yield name, name.as_posix().encode() + b"\n" + path.read_bytes()

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from collections import Counter
+from dataclasses import replace
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tactileq.experiments.publishing.presented import render_presentation
-from tactileq.experiments.publishing.redacting import LEFT_OUT, redact
+from tactileq.experiments.publishing.redacting import BEGINNING, LEFT_OUT, _beginnings, redact
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
-from tactileq.experiments.sessions.kept.stored_sessions import held_sessions
+from tactileq.experiments.sessions.kept.stored_sessions import StoredSession, held_sessions
 from tactileq.experiments.sessions.store.session_store import SessionStore
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.verification.verifying import verify_data
@@ -150,3 +153,40 @@ def test_a_presented_trial_renders_again_bit_for_bit(
         render_presentation(finished, session, number, models=[])
     with refused(InputError, got="none"):
         render_presentation(finished, session, 999, models=every)
+
+
+def test_what_lies_beside_a_session_is_not_its_own(
+    finished: Path, models: ModelSets, tmp_path: Path
+) -> None:
+    """Notes beside a log, and what a link leads to, are no data; also of a session that was killed
+    before its log could list its files."""
+    root = Path(shutil.copytree(finished, tmp_path / "data"))
+    log = next(root.glob("sourcedata/sub-01/*/*absolute_log.jsonl"))
+    lines = log.read_bytes().splitlines(keepends=True)
+    assert b'"stored"' in lines[-1]
+    log.write_bytes(b"".join(lines[:-1]))
+    notes = log.with_name(log.name.replace("log.jsonl", "notes.txt"))
+    notes.write_text("Anna was tired")
+    redacted = redact(root, tmp_path / "copy", sources=SOURCES, described={})
+    assert "Anna" not in everything(tmp_path / "copy")
+    files = {path for path in (tmp_path / "copy").rglob("*") if path.is_file()}
+    assert redacted.files == files
+    hand = log.with_name(log.name.replace("log.jsonl", "hand.tsv"))
+    elsewhere = hand.rename(tmp_path / "elsewhere.tsv")
+    hand.symlink_to(elsewhere)
+    with refused(InputError, expected=hand, got=elsewhere):
+        redact(root, tmp_path / "other", sources=SOURCES, described={})
+
+
+def test_each_of_many_days_begins_at_noon(finished: Path) -> None:
+    """However many sessions there were before."""
+    (one, *_), _ = held_sessions(finished)
+    first = datetime.fromisoformat(one.state.begun_utc)
+
+    def on_day(day: int) -> StoredSession:
+        events = [{**e, "utc": (first + timedelta(days=day)).isoformat()} for e in one.state.events]
+        state = replace(one.state, events=tuple(events), begun_utc=events[0]["utc"])
+        return replace(one, files=replace(one.files, session=day + 1), state=state)
+
+    begins = dict(_beginnings([on_day(day) for day in range(100)]))
+    assert list(begins.values()) == [BEGINNING + timedelta(days=day) for day in range(100)]

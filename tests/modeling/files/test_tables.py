@@ -17,8 +17,9 @@ from tactileq.experiments.sessions.kept.tables import cell as session_cell
 from tactileq.modeling.files.columns import Column
 from tactileq.modeling.files.tables import guarded, read_table, table_text, unguarded, write_table
 
-FORMULAS = ["=1+1", "+1", "@SUM(A1)", "'=1", "''@x", '=HYPERLINK("a")']
-PLAIN = ["oak", "'oak'", "'", "-1", "1=1", "", "wall paper", "a@b", "−1"]
+FORMULAS = ["=1+1", "+1", "@SUM(A1)", "-A1", "-1+1", "- 1", "'=1", "''@x", '=HYPERLINK("a")']
+NUMBERS = ["-1", "-3.2", "-.5", "-1.5e-07", "-2E+3", "-inf"]
+PLAIN = ["oak", "'oak'", "'", "'-1", "-", "1=1", "", "wall paper", "a@b", "−1", *NUMBERS]
 TEXT = st.text(st.sampled_from("'=+@-a 1"), max_size=6)
 
 
@@ -28,10 +29,19 @@ def test_no_cell_begins_as_a_formula(text: str) -> None:
     for written in (
         table_text([Column("name")], [{"name": text}]).splitlines()[1],
         tsv_text(pd.DataFrame({"name": [text]})).splitlines()[1],
-        bids_cell(text),
         session_cell(text),
     ):
         assert written.lstrip('"').startswith("'")
+
+
+@pytest.mark.parametrize("text", [*FORMULAS, *filter(None, PLAIN)])
+def test_a_cell_of_bids_is_what_it_holds(text: str, tmp_path: Path) -> None:
+    """Validators compare it with the levels in its sidecar."""
+    table = tmp_path / "a.tsv"
+    table.write_text(f"name\n{bids_cell(text)}\n")
+    assert [row["name"] for row in read_table(table, [Column("name")], bids=True)] == [text]
+    if '"' not in text:
+        assert bids_cell(text) == text
 
 
 @pytest.mark.parametrize("text", PLAIN)
@@ -43,9 +53,10 @@ def test_other_cells_stay_as_they_are(text: str) -> None:
 def test_every_text_is_read_back_as_it_was(text: str) -> None:
     assert unguarded(guarded(text)) == text
     assert guarded(text)[:1] not in ("=", "+", "@")
+    assert guarded(text)[:1] != "-" or text == "-" or float(text) < 0
     if text.strip():
         (row,) = csv.reader(io.StringIO(bids_cell(text)), delimiter="\t")
-        assert unguarded(row[0]) == text
+        assert row[0] == text
 
 
 def test_a_table_is_read_back_as_it_was(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 import soundfile
 
 from tactileq.modeling import InputError, RecordingSet
-from tactileq.modeling.files.wav import read_wav
+from tactileq.modeling.files.wav import read_wav, samples_only
 from tests.refusals import refused
 
 NOISE = np.random.default_rng(1).standard_normal(100)
@@ -134,3 +134,29 @@ def test_bytes_after_the_wav_are_no_harm(tmp_path: Path) -> None:
     soundfile.write(path, NOISE / 10, 8000, subtype="PCM_16")
     path.write_bytes(path.read_bytes() + b"tail")
     assert read_wav(path)[0].size == NOISE.size
+
+
+def chunk(name: bytes, content: bytes) -> bytes:
+    return name + len(content).to_bytes(4, "little") + content + bytes(len(content) % 2)
+
+
+@pytest.mark.parametrize("subtype", ["PCM_24", "PCM_16", "FLOAT"])
+def test_samples_only_leaves_nothing_but_the_sound(tmp_path: Path, subtype: str) -> None:
+    """Whatever stands before, between and behind, of even and of odd length."""
+    samples = np.linspace(-0.5, 0.5, 101)
+    soundfile.write(tmp_path / "a.wav", samples, 8000, subtype=subtype)
+    whole = (tmp_path / "a.wav").read_bytes()
+    plain = samples_only(whole, tmp_path / "a.wav")
+    noted = b"RIFF" + bytes(4) + b"WAVE" + chunk(b"bext", b"secret!") + whole[12:]
+    noted += chunk(b"LIST", b"secret") + b"secret"
+    assert samples_only(noted, tmp_path / "a.wav") == plain == samples_only(plain, Path("a.wav"))
+    assert b"secret" not in plain
+    (tmp_path / "b.wav").write_bytes(plain)
+    for one, other in zip(read_wav(tmp_path / "a.wav"), read_wav(tmp_path / "b.wav"), strict=True):
+        assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize("data", [b"", b"RIFF", b"OggS" * 9, b"RIFF\0\0\0\0WAVE", b"x" * 99])
+def test_samples_only_of_what_is_no_sound(data: bytes) -> None:
+    with refused(InputError, expected="WAV", got="else", names="a.wav"):
+        samples_only(data, Path("a.wav"))
