@@ -17,6 +17,7 @@ from tactileq.experiments.sessions.kept.data_set import DESCRIPTION_NAME
 from tactileq.experiments.sessions.kept.log import Event, object_of, sealed_line, utc_text
 from tactileq.experiments.sessions.kept.roster import Roster, sealed_roster_line
 from tactileq.experiments.sessions.kept.stored_sessions import StoredSession, held_sessions
+from tactileq.experiments.sessions.kept.texts import texts_of_sessions
 from tactileq.modeling import InputError
 from tactileq.modeling.files.documents import dump_json, read_json_object
 from tactileq.modeling.files.hashes import sha256_of_paths
@@ -95,6 +96,8 @@ def redact(
         files = one.manifest.files(out)
         files.folder.mkdir(parents=True, exist_ok=True)
         _copy_session(one, files.folder, change, begins[one.files.stem], seals=new_seals)
+    for path in texts_of_sessions(held):
+        shutil.copyfile(data_folder / path, out / path)
     _write_roster(out, roster, new_seals)
     description = read_json_object(data_folder / DESCRIPTION_NAME, advice="restore the file")
     write_text(out / DESCRIPTION_NAME, dump_json({**description, **described}))

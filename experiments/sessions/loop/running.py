@@ -16,6 +16,7 @@ from tactileq.experiments.sessions.kept.program import program_facts
 from tactileq.experiments.sessions.kept.resume import resumption
 from tactileq.experiments.sessions.kept.roster import LastSeal, Roster, RosterEntry
 from tactileq.experiments.sessions.kept.stored_sessions import held_session
+from tactileq.experiments.sessions.kept.texts import TextsByLanguage, sha256_of_texts
 from tactileq.experiments.sessions.kept.writer import StoreError
 from tactileq.experiments.sessions.loop.agenda import Agenda
 from tactileq.experiments.sessions.loop.order import draw_session
@@ -28,7 +29,6 @@ from tactileq.experiments.study.design import SessionPlan
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.study import Study, plan_sha256
 from tactileq.modeling import InputError
-from tactileq.modeling.errors import shown
 from tactileq.rig.shared.interface import TextureRig
 
 
@@ -50,6 +50,8 @@ class Circumstances:
         Whether to continue with a session that was aborted or interrupted.
     sources : mapping of set of models to path
         Where the models came from.
+    texts : mapping of language to mapping of key to text
+        What participants read, in each language of the study; empty where nobody reads.
 
     Raises
     ------
@@ -63,6 +65,7 @@ class Circumstances:
     tell: Callable[[str], None] | None = None
     resume: bool = False
     sources: Mapping[str, str] = field(default_factory=dict)
+    texts: TextsByLanguage = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         Overrides(self.override)  # refuses a reason that says nothing before anything is opened
@@ -112,9 +115,9 @@ def run_session(
         If the disk does not take the answers.
     """
     said = circumstances or Circumstances()
+    said = replace(said, language=study.language_of_session(said.language))
     overrides = Overrides(said.override, tell=said.tell)
     models.require(study, allow=overrides.allow)
-    _require_language(study, said.language)
     root = Path(data_folder)
     for stimulus in models.stimuli:
         rig.check_stimulus(stimulus)
@@ -144,7 +147,7 @@ def run_session(
             if said.resume and files.manifest.exists():
                 held_session(files)  # nothing goes on that cannot be read to its end
             opened = SessionStore.resume if said.resume else SessionStore.create
-            store = opened(root, manifest, overrides=overrides)
+            store = opened(root, manifest, overrides=overrides, texts=said.texts)
         with _sealed(store, root):
             stored = _stored_plan(plan, task, store=store, models=models)
             result = run_trials(
@@ -193,7 +196,8 @@ def _stated(
     sha256 = models.sha256(study.textures)
     return {
         "task": task.name,
-        "language": said.language or study.languages[0],
+        "language": said.language,
+        "texts_sha256": sha256_of_texts(said.texts) or None,
         "pilot": said.pilot,
         "simulated_participant": people.respondent.simulated,
         "simulated_rig": rig.simulated,
@@ -207,14 +211,6 @@ def _stated(
         "description": task.description,
         **program_facts(),
     }
-
-
-def _require_language(study: Study, language: str) -> None:
-    if language and language not in study.languages:
-        raise InputError(
-            f"expected a language of the study ({', '.join(study.languages)}), got "
-            f"{shown(language)}; choose one, or add it to the study."
-        )
 
 
 def _intake(study: Study, root: Path, person: RosterEntry) -> Intake:

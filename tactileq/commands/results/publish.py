@@ -50,6 +50,7 @@ def publish(
     from tactileq.experiments.publishing.archive import COMMAND, DATA
     from tactileq.experiments.publishing.metadata import Publication
     from tactileq.experiments.sessions.bids.validator import bids_issues, said_of
+    from tactileq.experiments.sessions.kept.texts import texts_files
     from tactileq.experiments.study.study import Study
     from tactileq.modeling import InputError
     from tactileq.modeling.errors import counted
@@ -79,8 +80,10 @@ def publish(
     reported = (*_WITH_MODELS, "plan")
     given |= {name: Path(options[name]) for name in reported if options.get(name)}
     written.reads(*given.values())
+    texts = texts_files(found.manifests[0].texts_sha256)
+    here = {language: Path(DATA, file) for language, file in texts.items()}
     publication = Publication(
-        study=replace(ran, publication=stated.publication),
+        study=replace(ran, publication=stated.publication, texts=here),
         data=data,
         models=places,
         stimuli=stimuli,

@@ -12,11 +12,11 @@ import typer
 from typer.testing import CliRunner
 
 from tactileq.commands.study.session import session
+from tactileq.experiments.console.languages import Texts
 from tactileq.experiments.sessions.kept.log import read_log
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
 from tactileq.experiments.sessions.loop.people import SessionAborted
 from tactileq.experiments.sessions.loop.surfaces import Surfaces
-from tactileq.experiments.study.study import Study
 from tactileq.modeling import InputError
 from tests.experiments.scripted import Ready, Scripted
 from tests.refusals import refused
@@ -44,8 +44,8 @@ def language_of(place: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     def run(someone: Scripted, *words: str) -> str:
         opened: list[str] = []
 
-        def open_console(plan: Study, *, language: str, **of: Any) -> Any:
-            opened.append(language or plan.languages[0])
+        def open_console(texts: Texts, **of: Any) -> Any:
+            opened.append(texts.language)
             return nullcontext(someone)
 
         monkeypatch.setattr("tactileq.commands.study.session.open_console", open_console)
