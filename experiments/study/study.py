@@ -42,6 +42,7 @@ TWO_MODELS = {"full": "models", "simplified": "simplified"}
 SHIPPED_STUDY = Path(__file__).with_name("study.toml")
 
 Language = Annotated[str, key(pattern="^[a-z]{2,3}$", holds=is_line)]
+TextsFile = Annotated[str, key(pattern=r"(^|/)[a-z]{2,3}\.\w+$")]
 
 
 def _by_language(texts: object) -> object:
@@ -144,7 +145,7 @@ class Study(DescribedFile):
             expected='a file such as "de.toml", named by its language, or a table such as '
             '{de = "texts/de.toml"}',
             reads=_by_language,
-            also=str,
+            also=TextsFile,
         ),
     ] = field(default_factory=dict)
     consent: Annotated[Consent, key("the page of consent")] = Consent()

@@ -110,12 +110,13 @@ def run_session(
     Raises
     ------
     InputError
-        If a model is missing, the session cannot begin or be resumed, or the rig cannot be opened.
+        If a model or the texts of a language are missing, the session cannot begin or be resumed, or the rig cannot be opened.
     StoreError
         If the disk does not take the answers.
     """
     said = circumstances or Circumstances()
     said = replace(said, language=study.language_of_session(said.language))
+    _require_texts(study, said.texts)
     overrides = Overrides(said.override, tell=said.tell)
     models.require(study, allow=overrides.allow)
     root = Path(data_folder)
@@ -211,6 +212,15 @@ def _stated(
         "description": task.description,
         **program_facts(),
     }
+
+
+def _require_texts(study: Study, texts: TextsByLanguage) -> None:
+    """Refuse texts, where there are any, in other languages than the study's."""
+    if texts and set(texts) != set(study.languages):
+        raise InputError(
+            f"expected texts in each language of the study ({', '.join(study.languages)}), got "
+            f"them in {', '.join(texts)}; give those of all its languages, or none."
+        )
 
 
 def _intake(study: Study, root: Path, person: RosterEntry) -> Intake:
