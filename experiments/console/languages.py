@@ -60,7 +60,7 @@ class Texts:
         if not files:
             raise InputError(
                 f"expected a shipped language ({', '.join(languages())}), got {shown(language)}; "
-                f'choose one, or name a file of its texts in the study file: texts = '
+                f"choose one, or name a file of its texts in the study file: texts = "
                 f'"{language}.toml", which begins as a copy of {FOLDER / COMPLETE}.toml.'
             )
         complete, _ = _read(FOLDER / f"{COMPLETE}.toml")

@@ -139,9 +139,9 @@ class Study(DescribedFile):
     texts: Annotated[
         Mapping[Language, Path],
         key(
-            "files of your own texts by language, relative to the file: of a shipped language those "
-            "that differ, of another one all; a single file is named by its language; no part of "
-            "what identifies the study",
+            "files of your own texts by language, relative to the file: those that differ from the "
+            "shipped ones, or all of another language; one file alone has the name of its "
+            "language; no part of what identifies the study",
             expected='a file such as "de.toml", named by its language, or a table such as '
             '{de = "texts/de.toml"}',
             reads=_by_language,

@@ -57,7 +57,7 @@ def texts_of_sessions(held: Iterable[StoredSession]) -> dict[Path, str]:
     InputError
         For a log that states other things of them than hashes.
     """
-    found = {}
+    found: dict[Path, str] = {}
     for one in held:
         with naming(one.files.log):
             for stated in _stated(one):

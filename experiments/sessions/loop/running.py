@@ -110,7 +110,8 @@ def run_session(
     Raises
     ------
     InputError
-        If a model or the texts of a language are missing, the session cannot begin or be resumed, or the rig cannot be opened.
+        If a model or the texts of a language are missing, the session cannot begin or be resumed,
+        or the rig cannot be opened.
     StoreError
         If the disk does not take the answers.
     """

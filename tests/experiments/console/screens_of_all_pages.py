@@ -252,8 +252,8 @@ OWN = Question(
     text={
         "en": "How many hours a week have you worked with textiles, wood or metal over the last "
         "twelve months?",
-        "de": "Wie viele Stunden pro Woche haben Sie in den letzten zwölf Monaten mit Textilien, Holz "
-        "oder Metall gearbeitet?",
+        "de": "Wie viele Stunden pro Woche haben Sie in den letzten zwölf Monaten mit Textilien, "
+        "Holz oder Metall gearbeitet?",
         "ja": "この一年間、一週間に平均して何時間くらい、布や木や金属を手で扱う仕事をしましたか",
     },
     levels_text={
