@@ -269,7 +269,7 @@ def test_a_missing_translation_is_refused_by_check_and_session_in_one_sentence(
     whole = file.read_text(encoding="utf-8")
     craft = '[[questions]]\nname = "craft"\nlevels = ["no", "yes"]\ntext.en = "Any craft?"\n'
     wrong = {
-        whole.replace('"en", "ja"', '"en", "fr"'): "expected a language of en, ja, got 'fr'",
+        whole.replace('"en", "ja"', '"en", "fr"'): "got 'fr'; choose one, or name a file",
         f"{whole}\n{craft}": "expected the question craft in en, ja, got none in ja",
         f'{whole}\n{craft}text.ja = "手仕事は?"': "expected the levels of the question craft in "
         "en, ja, got none in ja; write levels_text.ja = [",

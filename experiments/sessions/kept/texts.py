@@ -29,11 +29,6 @@ def texts_file(language: str, sha256: str) -> Path:
     return Path("sourcedata", f"texts_{language}_{sha256[:_DIGITS]}.toml")
 
 
-def texts_files(stated: Mapping[str, str] | None) -> dict[str, Path]:
-    """The file of each language, relative to the data set, where a manifest states the hashes."""
-    return {language: texts_file(language, sha256) for language, sha256 in (stated or {}).items()}
-
-
 def write_texts(root: Path, texts: TextsByLanguage) -> None:
     """Write the file of each language that is not there yet, forced to disk.
 

@@ -200,10 +200,10 @@ class SessionStore:
                 store = cls(files, stored, handle=handle, lock=lock)
                 try:
                     _check_open(store.before, stored, files=files)
-                except InputError:
+                    write_texts(files.root, texts or {})
+                except (InputError, OSError):
                     store.close()
                     raise
-                write_texts(files.root, texts or {})
                 changed = {"changed": _changes(stored, manifest), "overrides": overrides.recorded}
                 store._open({"resumed": True, **changed})
         except StoreError:

@@ -432,6 +432,12 @@ def test_without_what_is_read_no_session_begins(
         run(texts=TEXTS)
     assert not list(tmp_path.rglob("*_manifest.json"))
     assert not list(tmp_path.rglob("texts_*"))
+    _, manifest = run(Tired(2))
+    before = log_beside(manifest).read_bytes()
+    with refused(StoreError, names="full disk"):
+        run(texts=TEXTS, resume=True)
+    assert log_beside(manifest).read_bytes() == before
+    assert run(resume=True)[0].completed  # nobody holds the session any more
 
 
 def test_a_session_of_before_texts_were_stored_goes_on(run: Callable[..., Any]) -> None:
