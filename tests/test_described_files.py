@@ -271,6 +271,7 @@ STUDY = Kind(
             **_TEXTURES,
             "models": {"full": "models", "simplified": "simplified"},
             "languages": ["en", "ja"],
+            "texts": {"ja": "ja.toml"},
             "longest_gap_min": 20,
             "masking": "pink noise",
             "surface_visible": "no",

@@ -25,7 +25,12 @@ from tactileq.modeling.files.tables import read_table
 
 _RESTS_ON = ("StudySHA256", "ModelsSHA256")
 # In what a session may differ if its manifest records the reason, and under which word.
-MAY_DIFFER = {"StudySHA256": "study", "ModelsSHA256": "models", "Pilot": "pilot"}
+MAY_DIFFER = {
+    "StudySHA256": "study",
+    "ModelsSHA256": "models",
+    "TextsSHA256": "texts",
+    "Pilot": "pilot",
+}
 _ADVICE = "correct it, or delete the file, which tactileq study status makes again from the log"
 
 
@@ -60,8 +65,9 @@ def checked_sidecar(
     for key, value in origin.items():
         if sidecar.get(key, value) == value or MAY_DIFFER.get(key) in allowed:
             continue
-        found = "another" if key in _RESTS_ON else json.dumps(sidecar[key])
-        wanted = f"one {key}" if key in _RESTS_ON else f"{key} {json.dumps(value)}"
+        is_hash = key.endswith("SHA256")
+        found = "another" if is_hash else json.dumps(sidecar[key])
+        wanted = f"one {key}" if is_hash else f"{key} {json.dumps(value)}"
         raise InputError(
             f"expected {wanted} in {path}, as dataset_description.json says, "
             f"never a mixture, but found {found}; correct the file or leave "

@@ -34,8 +34,8 @@ class Console:
 
     Parameters
     ----------
-    language : str
-        One of `tactileq.experiments.console.languages.languages()`.
+    texts : Texts, optional
+        What the pages say; by default in English.
     stamp : str
         What every page is marked with, such as "pilot, simulated rig"; empty for none.
     size : (int, int)
@@ -48,7 +48,7 @@ class Console:
     Raises
     ------
     InputError
-        For a language or a screen that is not there.
+        For a screen that is not there.
     """
 
     simulated = False
@@ -56,14 +56,14 @@ class Console:
     def __init__(
         self,
         *,
-        language: str = "en",
+        texts: Texts | None = None,
         stamp: str = "",
         size: tuple[int, int] = (1280, 800),
         fullscreen: bool = False,
         screen: int = 0,
         on_page: PageHook | None = None,
     ) -> None:
-        texts = Texts.load(language)
+        texts = texts or Texts.load("en")
         self._window = open_window(size=size, fullscreen=fullscreen, screen=screen)
         self._runner = PageRunner(self._window, texts, stamp=texts.stamp(stamp), on_page=on_page)
 

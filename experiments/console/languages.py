@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from string import Formatter
@@ -11,15 +11,16 @@ from typing import Any
 from tactileq.experiments.study.questions import Question
 from tactileq.experiments.study.study import Study
 from tactileq.modeling import InputError
-from tactileq.modeling.errors import shown
+from tactileq.modeling.errors import shortened, shown
 from tactileq.modeling.files.documents import read_toml
 
 FOLDER = Path(__file__).with_name("texts")
 COMPLETE = "en"  # the language of which every other one has the keys
+PROOFREAD = "proofread"  # the only key of a file that is no text
 
 
 def languages() -> tuple[str, ...]:
-    """The languages that there are: names of files, such as "en" and "ja"."""
+    """The languages that are shipped: names of files, such as "en" and "ja"."""
     return tuple(sorted(file.stem for file in FOLDER.glob("*.toml")))
 
 
@@ -31,42 +32,52 @@ class Texts:
     ----------
     by_key : mapping of key to text
         Keys have dots ("absolute.main.title"); texts have {places} for values.
+    proofread : bool
+        Whether a native speaker has read them, as their file states.
     """
 
     language: str
     by_key: Mapping[str, str]
+    proofread: bool = True
 
     @staticmethod
-    def load(language: str) -> Texts:
-        """The texts of one of `languages()`.
+    def load(language: str, own: Path | None = None) -> Texts:
+        """The texts of a language: those that are shipped, a study's own ones in their place.
+
+        Parameters
+        ----------
+        own : Path, optional
+            A study's file: of a shipped language the texts that differ, of another one all.
 
         Raises
         ------
         InputError
-            If there is no such language, or if its file lacks a key, has one too many, or leaves
-            a place out that the English text has.
+            If there is no such language, or a file lacks a text, has one too many, or does not have
+            the places of the English text.
         """
-        if language not in languages():
+        shipped = FOLDER / f"{language}.toml"
+        files = [file for file in (shipped if language in languages() else None, own) if file]
+        if not files:
             raise InputError(
-                f"expected a language of {', '.join(languages())}, got {shown(language)}; choose "
-                f"one, or add {language}.toml beside the others."
+                f"expected a shipped language ({', '.join(languages())}), got {shown(language)}; "
+                f"choose one, or name a file of its texts in the study file: texts = "
+                f'"{language}.toml", which begins as a copy of {FOLDER / COMPLETE}.toml.'
             )
-        texts, complete = _read(language), _read(COMPLETE)
-        missing = sorted(complete.keys() - texts.keys())
-        if missing:
-            _refuse(language, f"a text for {', '.join(missing)}", "got none; add what is missing")
-        unknown = sorted(texts.keys() - complete.keys())
-        if unknown:
-            _refuse(language, "the texts that English has", f"got {', '.join(unknown)}; remove it")
-        for key, content in texts.items():
-            wanted, found = _places(complete[key]), _places(content)
-            if found != wanted:
-                expected = (
-                    f"the placeholders {', '.join(sorted(wanted)) or 'none'} of English in {key}"
-                )
-                got = ", ".join(sorted(found)) or "none"
-                _refuse(language, expected, f"got {got}; correct it")
-        return Texts(language, texts)
+        complete, _ = _read(FOLDER / f"{COMPLETE}.toml")
+        texts: dict[str, str] = {}
+        proofread = True
+        for file in files:
+            found, stated = _read(file)
+            _check(found, complete, file)
+            texts |= found
+            proofread = proofread if stated is None else stated
+        if missing := [key for key in complete if key not in texts]:
+            raise InputError(
+                f"expected a text for {shortened(', '.join(missing))} in {files[-1]}, got none; "
+                f"add what is missing ({len(missing)} of {len(complete)} texts), as in "
+                f"{FOLDER / COMPLETE}.toml."
+            )
+        return Texts(language, texts, proofread)
 
     def of(self, key: str, **values: object) -> str:
         """The text of a key, with its places filled in; KeyError for an unknown key."""
@@ -117,31 +128,66 @@ class Texts:
         )
 
 
-def require_texts(study: Study) -> None:
-    """Refuse a study of which a page has no text in one of its languages.
+def texts_of_study(study: Study) -> dict[str, Texts]:
+    """The texts of each language of a study; a study of which a page lacks a text is refused.
 
     Raises
     ------
     InputError
         Naming the first language that is not there or lacks a text.
     """
-    for language in study.languages:
-        Texts.load(language).require(study.questions)
-
-
-def _read(language: str) -> dict[str, str]:
-    file = FOLDER / f"{language}.toml"
-    texts: dict[str, str] = {}
-    _flatten(read_toml(file, "texts of a language"), "", texts)
+    texts = {name: Texts.load(name, study.texts.get(name)) for name in study.languages}
+    for of_language in texts.values():
+        of_language.require(study.questions)
     return texts
 
 
-def _flatten(values: Mapping[str, Any], before: str, texts: dict[str, str]) -> None:
+def _read(file: Path) -> tuple[dict[str, str], bool | None]:
+    """The texts of a file by their keys, and whether it states that they are proofread."""
+    values = read_toml(file, "texts of a language")
+    proofread = values.pop(PROOFREAD, None)
+    if not isinstance(proofread, bool | None):
+        raise InputError(
+            f"expected true or false for {PROOFREAD} in {file}, got {shown(proofread)}; correct it."
+        )
+    texts: dict[str, str] = {}
+    for key, value in _flat(values):
+        if not _is_text(value):
+            raise InputError(
+                f"expected printable text for {key} in {file}, got {shown(value)}; put a text in "
+                "quotes."
+            )
+        texts[key] = value
+    return texts, proofread
+
+
+def _flat(values: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
     for key, value in values.items():
         if isinstance(value, Mapping):
-            _flatten(value, f"{before}{key}.", texts)
+            yield from _flat(value, f"{before}{key}.")
         else:
-            texts[f"{before}{key}"] = str(value)
+            yield f"{before}{key}", value
+
+
+def _is_text(value: object) -> bool:
+    """Whether a page can show this: printable text, which may have several lines."""
+    return isinstance(value, str) and value.strip() != "" and value.replace("\n", "").isprintable()
+
+
+def _check(texts: Mapping[str, str], complete: Mapping[str, str], file: Path) -> None:
+    """Refuse a text that no page shows, and one with other places than in English."""
+    for key, content in texts.items():
+        if key not in complete:
+            raise InputError(
+                f"expected texts that English has in {file}, got {shown(key)}; remove it, or "
+                "correct its name."
+            )
+        wanted, found = _places(complete[key]), _places(content)
+        if found != wanted:
+            raise InputError(
+                f"expected the placeholders {', '.join(sorted(wanted)) or 'none'} of English in "
+                f"{key} of {file}, got {', '.join(sorted(found)) or 'none'}; correct it."
+            )
 
 
 def _places(content: str) -> set[str]:
@@ -149,7 +195,3 @@ def _places(content: str) -> set[str]:
         return {name for _, name, _, _ in Formatter().parse(content) if name is not None}
     except ValueError:  # a brace that is not closed: no place of any text
         return {"{"}
-
-
-def _refuse(language: str, expected: str, got: str) -> None:
-    raise InputError(f'expected {expected} in the language "{language}", {got} in {language}.toml.')

@@ -18,6 +18,7 @@ from tactileq.experiments.sessions.kept.data_set import DESCRIPTION_NAME
 from tactileq.experiments.sessions.kept.log import Event, object_of, sealed_line, utc_text
 from tactileq.experiments.sessions.kept.roster import Roster, sealed_roster_line
 from tactileq.experiments.sessions.kept.stored_sessions import StoredSession, held_sessions
+from tactileq.experiments.sessions.kept.texts import texts_of_sessions
 from tactileq.modeling import InputError
 from tactileq.modeling.files.documents import dump_json, read_json_object
 from tactileq.modeling.files.hashes import sha256_of_paths
@@ -102,6 +103,8 @@ def redact(
         files = one.manifest.files(out)
         files.folder.mkdir(parents=True, exist_ok=True)
         copies.add(one, files.folder, begins=begins[one.files.stem])
+    for path in texts_of_sessions(held):
+        copies.write(out / path, read_bytes(data_folder / path, "what participants read"))
     copies.write(Roster(out).path, _roster(roster, copies.seals))
     description = read_json_object(data_folder / DESCRIPTION_NAME, advice="restore the file")
     text = dump_json({**description, **described, REDACTED: True})

@@ -42,6 +42,12 @@ TWO_MODELS = {"full": "models", "simplified": "simplified"}
 SHIPPED_STUDY = Path(__file__).with_name("study.toml")
 
 Language = Annotated[str, key(pattern="^[a-z]{2,3}$", holds=is_line)]
+TextsFile = Annotated[str, key(pattern=r"(^|/)[a-z]{2,3}\.\w+$")]
+
+
+def _by_language(texts: object) -> object:
+    """One file, whose name says its language, as a table of one; all else as it is."""
+    return {Path(texts).stem: texts} if isinstance(texts, str) else texts
 
 
 def _is_version(text: str) -> bool:
@@ -130,6 +136,18 @@ class Study(DescribedFile):
             min_length=1,
         ),
     ] = ("en",)
+    texts: Annotated[
+        Mapping[Language, Path],
+        key(
+            "files of your own texts by language, relative to the file: those that differ from the "
+            "shipped ones, or all of another language; one file alone has the name of its "
+            "language; no part of what identifies the study",
+            expected='a file such as "de.toml", named by its language, or a table such as '
+            '{de = "texts/de.toml"}',
+            reads=_by_language,
+            also=TextsFile,
+        ),
+    ] = field(default_factory=dict)
     consent: Annotated[Consent, key("the page of consent")] = Consent()
     questions: Annotated[tuple[Question, ...], key("what each participant is asked once")] = ()
     plan: Annotated[PlanSection, key("what is fixed before the first answer")] = field(
@@ -171,6 +189,7 @@ class Study(DescribedFile):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._check_trays()
+        self._check_texts()
         self._check_questions()
         if self.wall is not None:
             self.wall.check_textures(self.textures)
@@ -183,6 +202,13 @@ class Study(DescribedFile):
             raise InputError(
                 f"expected one tray for each of {', '.join(self.textures)}, got trays for "
                 f"{', '.join(self.trays) or 'none'}; give each texture its tray under [trays]."
+            )
+
+    def _check_texts(self) -> None:
+        if others := [name for name in self.texts if name not in self.languages]:
+            raise InputError(
+                f"expected texts in a language of the study ({', '.join(self.languages)}), got "
+                f"{shown(others[0])}; add it to languages, or remove its file from texts."
             )
 
     def _check_questions(self) -> None:
@@ -232,6 +258,21 @@ class Study(DescribedFile):
                 f'{FEWEST_OF_MODEL} or more, or write rule = "tests" in [plan] and leave few out.'
             )
 
+    def language_of_session(self, asked: str) -> str:
+        """The language that is asked for; the first one where none is.
+
+        Raises
+        ------
+        InputError
+            If the study does not have it.
+        """
+        if asked and asked not in self.languages:
+            raise InputError(
+                f"expected a language of the study ({', '.join(self.languages)}), got "
+                f"{shown(asked)}; choose one, or add it to the study."
+            )
+        return asked or self.languages[0]
+
     def plan_of(self, task: str) -> TaskPlan:
         """Participants, schedule, models and repeats of one task.
 
@@ -269,8 +310,12 @@ class Study(DescribedFile):
         return len(plan.models) if plan.schedule == "by-day" else 1
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values of what fixes the experiment, so without the publication."""
-        return {name: value for name, value in self.to_tables().items() if name != "publication"}
+        """Plain values of what fixes the experiment.
+
+        So without the publication, and without the places of texts, which data name by their hash.
+        """
+        left_out = ("publication", "texts")
+        return {name: value for name, value in self.to_tables().items() if name not in left_out}
 
     def to_tables(self) -> dict[str, Any]:
         """Plain values of the whole file."""

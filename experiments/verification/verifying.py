@@ -16,12 +16,14 @@ from tactileq.experiments.sessions.kept.data_set import (
     DESCRIPTION_NAME,
     MAY_DIFFER,
     describe_data_set,
+    is_other,
 )
 from tactileq.experiments.sessions.kept.files import SessionFiles, require_data_folder, sessions_in
 from tactileq.experiments.sessions.kept.log import plain
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
 from tactileq.experiments.sessions.kept.roster import Roster
 from tactileq.experiments.sessions.kept.stored_sessions import Damaged, StoredSession, held_sessions
+from tactileq.experiments.sessions.kept.texts import texts_of_sessions
 from tactileq.experiments.sessions.loop.order import draw_session
 from tactileq.experiments.study.study import Study, plan_sha256
 from tactileq.experiments.tasks import task_named
@@ -43,6 +45,7 @@ _FIXED = (
     "Pilot",
     "StudySHA256",
     "ModelsSHA256",
+    "TextsSHA256",
     "StudyDesign",
 )
 
@@ -133,6 +136,7 @@ def verify_data(data_folder: str | Path) -> Verified:
     found += _strangers(root, held, damaged)
     found += _people(root, held)
     found += _description(root, held)
+    found += _texts(root, held)
     found += _chains(root, held, damaged)
     found += [
         Difference(place=_in(root, one), sentence=sentence, participant=one.files.participant)
@@ -358,9 +362,9 @@ def _description(root: Path, held: Sequence[StoredSession]) -> Iterator[Differen
         return
     described = [(one, describe_data_set(one.manifest)) for one in begun]
     # That of a session that was deleted with its participant may have been the first.
-    if not any(all(found.get(n) == made[n] for n in _FIXED) for _, made in described):
+    if not any(not any(is_other(n, found, made) for n in _FIXED) for _, made in described):
         first, made = min(described, key=lambda pair: pair[0].state.begun_utc)
-        name = next(n for n in _FIXED if found.get(n) != made[n])
+        name = next(n for n in _FIXED if is_other(n, found, made))
         yield Difference(
             place=DESCRIPTION_NAME,
             sentence=f"expected {name} as {first.files.stem} began with, got another",
@@ -369,13 +373,27 @@ def _description(root: Path, held: Sequence[StoredSession]) -> Iterator[Differen
     for one, made in described:
         allowed = {record["what"] for record in one.manifest.overrides}
         for name, what in MAY_DIFFER.items():
-            if made[name] != found[name] and what not in allowed:
+            if is_other(name, found, made) and what not in allowed:
                 yield Difference(
                     place=one.files.manifest.relative_to(root).as_posix(),
                     sentence=f"expected the {what} of the data set, or a reason for another, got "
                     "another without one",
                     participant=one.files.participant,
                 )
+
+
+def _texts(root: Path, held: Sequence[StoredSession]) -> Iterator[Difference]:
+    """The files of what participants read, by the hashes in manifests and logs."""
+    stated = texts_of_sessions(held)
+    there = sha256_of_paths(root / path for path in stated)
+    for path, sha256 in stated.items():
+        found = there.get(str(root / path))
+        if found != sha256:
+            yield Difference(
+                place=path.as_posix(),
+                sentence="expected the texts that sessions name by their hash, got "
+                f"{'others' if found else 'none'}",
+            )
 
 
 def _chains(

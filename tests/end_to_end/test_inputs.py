@@ -108,7 +108,8 @@ def _every_kind(folder: Path) -> Path:
     (folder / "two").mkdir()
     save_two_surfaces(folder / "two")
     study = folder / "two/study.toml"
-    study.write_text(study.read_text() + CLAIM)
+    study.write_text(study.read_text().replace("[trays]", 'texts = "en.toml"\n[trays]') + CLAIM)
+    (folder / "two/en.toml").write_text('rest.title = "Put down the pen"')
     (folder / "scenes.toml").write_text(SCENE_STUDY)
     (folder / "own-scene.toml").write_text(OWN_SCENE)
     own = SCENE_STUDY.replace("recorded.toml", "own-scene.toml")

@@ -14,6 +14,7 @@ import pytest
 import tomlkit
 from rocrate.rocrate import ROCrate
 
+from tactileq.experiments.console.languages import Texts, texts_of_study
 from tactileq.experiments.sessions.kept.stored_sessions import held_sessions
 from tactileq.experiments.study.study import Study
 from tactileq.modeling.files.hashes import seal_over
@@ -53,7 +54,9 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
             model.save(folder / name / f"{texture}.json")
     for texture in TEXTURES:
         simplified_texture(texture).save(folder / f"simplified/{texture}_simplification.json")
-    run_all(folder / "data", study, models, sources={name: name for name in models.sets})
+    texts = {"en": {**Texts.load("en").by_key, "rest.title": "Put down the pen"}}
+    sources = {name: name for name in models.sets}
+    run_all(folder / "data", study, models, sources=sources, texts=texts)
     write_study(folder, PUBLICATION)
     return folder
 
@@ -96,7 +99,9 @@ def test_an_archive_stands_alone(main, here: Path, tmp_path_factory, monkeypatch
     assert told[1].endswith(f"as written, seal {note['seal']}")
     assert told[2] == "models verified: 2 sets of 2"
     assert told[3].endswith("made again: the same")
-    assert Study.load(archive / "study.toml").sha256 == small_study(TEXTURES).sha256
+    study = Study.load(archive / "study.toml")
+    assert study.sha256 == small_study(TEXTURES).sha256
+    assert texts_of_study(study)["en"].of("rest.title") == "Put down the pen"
 
     (shown,) = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), flags=re.DOTALL)
     made: dict[str, Any] = {}

@@ -135,6 +135,23 @@ def test_a_study_is_checked_with_its_models_design_and_balance(place: Path, main
     assert "warning" not in done.stdout
 
 
+def test_the_check_says_which_texts_no_native_speaker_has_read(place: Path, main: Main) -> None:
+    done = main("study", "check", "study.toml")
+    assert "texts: en (as shipped), ja (as shipped)" in done.stdout
+    (note,) = [line for line in done.stdout.splitlines() if "native speaker" in line]
+    assert " ja " in note
+    file = place / "study.toml"
+    line = 'languages = ["en", "ja"]'
+    file.write_text(file.read_text("utf-8").replace(line, f'{line}\ntexts = "ja.toml" #'), "utf-8")
+    (place / "ja.toml").write_text("proofread = true")
+    done = main("study", "check", "study.toml")
+    assert done.returncode == 0, done.stderr
+    assert "native speaker" not in done.stdout
+    (place / "ja.toml").write_text('rest.titel = "休憩"', encoding="utf-8")
+    done = main("study", "check", "study.toml")
+    check_refusal(done.stderr, expected="ja.toml", got="rest.titel")
+
+
 def test_the_check_says_what_catch_trials_cost(place: Path, main: Main) -> None:
     file = place / "study.toml"
     begun = '[oddity]\nparticipants = 24\nschedule = "interleaved"\nrepeats = 6\n'
@@ -252,7 +269,7 @@ def test_a_missing_translation_is_refused_by_check_and_session_in_one_sentence(
     whole = file.read_text(encoding="utf-8")
     craft = '[[questions]]\nname = "craft"\nlevels = ["no", "yes"]\ntext.en = "Any craft?"\n'
     wrong = {
-        whole.replace('"en", "ja"', '"en", "fr"'): "expected a language of en, ja, got 'fr'",
+        whole.replace('"en", "ja"', '"en", "fr"'): "got 'fr'; choose one, or name a file",
         f"{whole}\n{craft}": "expected the question craft in en, ja, got none in ja",
         f'{whole}\n{craft}text.ja = "手仕事は?"': "expected the levels of the question craft in "
         "en, ja, got none in ja; write levels_text.ja = [",

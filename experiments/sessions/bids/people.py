@@ -175,6 +175,11 @@ def readme(description: Mapping[str, Any]) -> bytes:
         if description.get("Simulated")
         else ""
     )
+    texts = (
+        "sourcedata/texts_*         what participants read, by language\n"
+        if description.get("TextsSHA256")
+        else ""
+    )
     return f"""{description.get("Name", "")}
 {simulated}
 Answers of a study with tactileq, as a BIDS data set.
@@ -188,7 +193,7 @@ sub-XX/ses-XX/beh/         of each session
   *_physio.tsv.gz          the hand, 250 times a second; a file for each start of the session
 sourcedata/                what the program wrote during sessions; all of the above is generated
 from it
-
+{texts}
 Every column is described in the JSON file beside its table. n/a means that there is no value. Text
 with quotes is written as in CSV; control characters are replaced by their symbols.
 

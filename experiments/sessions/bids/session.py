@@ -174,6 +174,7 @@ def _circumstances(held: StoredSession) -> dict[str, Any]:
         "StudySHA256": manifest.study_sha256,
         "PlanSHA256": manifest.plan_sha256,
         "ModelsSHA256": manifest.models_sha256,
+        **({"TextsSHA256": manifest.texts_sha256} if manifest.texts_sha256 else {}),
         "Identical": manifest.identical,
         "Overrides": overrides,
         "Rig": manifest.rig,

@@ -19,7 +19,14 @@ from tactileq.modeling.files.places import locked
 BIDS_VERSION = "1.10.0"
 DESCRIPTION_NAME = "dataset_description.json"
 # What may differ for a stated reason; people and simulations never share a folder.
-MAY_DIFFER = {"StudySHA256": "study", "ModelsSHA256": "models", "Pilot": "pilot"}
+MAY_DIFFER = {
+    "StudySHA256": "study",
+    "ModelsSHA256": "models",
+    "TextsSHA256": "texts",
+    "Pilot": "pilot",
+}
+# What is not always recorded (`SessionManifest.texts_sha256`): without it nothing is said of it.
+_NOT_ALWAYS = ("TextsSHA256",)
 
 
 def claim_data_set(root: Path, manifest: SessionManifest, *, overrides: Overrides) -> None:
@@ -30,12 +37,13 @@ def claim_data_set(root: Path, manifest: SessionManifest, *, overrides: Override
     root : Path
         Made if it is not there.
     overrides : Overrides
-        Another study or other models, and pilot data beside others, are against the rules.
+        Another study, other models or texts, and pilot data beside others, are against the rules.
 
     Raises
     ------
     InputError
-        If it holds data of another study, of other models or of another kind of participants.
+        If it holds data of another study, of other models or texts, or of another kind of
+        participants.
     OSError
         If the disk does not take the description.
     """
@@ -80,11 +88,19 @@ def describe_data_set(manifest: SessionManifest) -> dict[str, Any]:
             "Pilot": manifest.pilot,
             "StudySHA256": manifest.study_sha256,
             "ModelsSHA256": manifest.models_sha256,
+            **({"TextsSHA256": manifest.texts_sha256} if manifest.texts_sha256 else {}),
             "StudyDesign": study,
             "GeneratedBy": [{"Name": "tactileq", "Version": manifest.versions.get("tactileq", "")}],
         }
     )
     return described
+
+
+def is_other(name: str, described: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Whether two descriptions state different things under a name."""
+    if name in _NOT_ALWAYS and not (name in described and name in other):
+        return False
+    return described.get(name) != other.get(name)
 
 
 def _check(
@@ -98,7 +114,7 @@ def _check(
                 "people and simulations never share one."
             )
     for key, what in MAY_DIFFER.items():
-        if found.get(key) != wanted[key]:
+        if is_other(key, found, wanted):
             overrides.allow(
                 what,
                 f"expected a data folder of this {_differs(key, found, wanted)} in {path}; choose "
@@ -109,8 +125,9 @@ def _check(
 def _differs(key: str, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
     if key == "StudySHA256":
         return f"study, got another {differing(found.get('StudyDesign'), wanted['StudyDesign'])}"
-    if key == "ModelsSHA256":
-        return f"set of models, got another {differing(found.get(key), wanted[key])}"
+    if key in ("ModelsSHA256", "TextsSHA256"):
+        what = "set of models" if key == "ModelsSHA256" else "wording of what participants read"
+        return f"{what}, got another {differing(found.get(key), wanted[key])}"
     return f"kind (pilot {wanted[key]}), got {shown(found.get(key))}"
 
 

@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 from tactileq.experiments.sessions.kept.files import SessionFiles
 from tactileq.experiments.sessions.kept.log import plain
+from tactileq.experiments.study.study import Language
 from tactileq.modeling.errors import InputError, shown
 from tactileq.modeling.files.described import key
 from tactileq.modeling.files.described_json import DescribedJson
@@ -37,7 +38,7 @@ class SessionManifest(DescribedJson):
     WHAT = "the manifest of a session"
     FORMAT = "tactileq.session-manifest"
     ADVICE = "restore the file from a copy"
-    OPTIONAL = frozenset({"after"})
+    OPTIONAL = frozenset({"after", "texts_sha256"})
 
     task: Annotated[str, key("as in the study file")]
     subject: Annotated[_FromOne, key("number of the participant")]
@@ -45,6 +46,14 @@ class SessionManifest(DescribedJson):
     slot: Annotated[_FromOne, key("the balanced parts of the order follow from it")]
     code: Annotated[str, key("the participant's pseudonym")]
     language: Annotated[str, key("of what the participant reads")]
+    texts_sha256: Annotated[
+        Mapping[Language, Annotated[str, key(pattern="^[0-9a-f]{64}$")]] | None,
+        key(
+            "of what participants read in each language of the study, by which its file in "
+            "sourcedata is named; missing where that was not recorded: of earlier versions, and of "
+            "simulated participants, who read nothing"
+        ),
+    ] = None
     pilot: Annotated[bool, key("whether it is a pilot")]
     simulated_participant: Annotated[bool, key("whether a program answered")]
     simulated_rig: Annotated[bool, key("whether nothing was played to a person")]

@@ -17,6 +17,7 @@ from tactileq.experiments.sessions.kept.program import program_facts
 from tactileq.experiments.sessions.kept.resume import resumption
 from tactileq.experiments.sessions.kept.roster import LastSeal, Roster, RosterEntry
 from tactileq.experiments.sessions.kept.stored_sessions import held_session
+from tactileq.experiments.sessions.kept.texts import TextsByLanguage, sha256_of_texts
 from tactileq.experiments.sessions.kept.writer import StoreError
 from tactileq.experiments.sessions.loop.agenda import Agenda
 from tactileq.experiments.sessions.loop.order import draw_session
@@ -30,7 +31,6 @@ from tactileq.experiments.study.design import SessionPlan
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.study import Study, plan_sha256
 from tactileq.modeling import InputError
-from tactileq.modeling.errors import shown
 from tactileq.rig.shared.interface import TextureRig
 
 
@@ -52,6 +52,8 @@ class Circumstances:
         Whether to continue with a session that was aborted or interrupted.
     sources : mapping of set of models to path
         Where the models came from.
+    texts : mapping of language to mapping of key to text
+        What participants read, in each language of the study; empty where nobody reads.
 
     Raises
     ------
@@ -65,6 +67,7 @@ class Circumstances:
     tell: Callable[[str], None] | None = None
     resume: bool = False
     sources: Mapping[str, str] = field(default_factory=dict)
+    texts: TextsByLanguage = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         Overrides(self.override)  # refuses a reason that says nothing before anything is opened
@@ -112,14 +115,16 @@ def run_session(
         If the participant does not consent: the session has not begun, the roster counts it, and
         nothing else is kept.
     InputError
-        If a model is missing, the session cannot begin or be resumed, or the rig cannot be opened.
+        If a model or the texts of a language are missing, the session cannot begin or be resumed,
+        or the rig cannot be opened.
     StoreError
         If the disk does not take the answers.
     """
     said = circumstances or Circumstances()
+    said = replace(said, language=study.language_of_session(said.language))
+    _require_texts(study, said.texts)
     overrides = Overrides(said.override, tell=said.tell)
     models.require(study, allow=overrides.allow)
-    _require_language(study, said.language)
     root = Path(data_folder)
     check_clock(root, tell=said.tell or _untold)
     for stimulus in models.stimuli:
@@ -153,7 +158,7 @@ def run_session(
                 trials=tuple(trial.to_dict() for trial in plan.trials),
             )
             opened = SessionStore.resume if said.resume else SessionStore.create
-            store = opened(root, manifest, overrides=overrides)
+            store = opened(root, manifest, overrides=overrides, texts=said.texts)
         with _sealed(store, root):
             stored = _stored_plan(plan, task, store=store, models=models)
             result = run_trials(
@@ -202,7 +207,8 @@ def _stated(
     sha256 = models.sha256(study.textures)
     return {
         "task": task.name,
-        "language": said.language or study.languages[0],
+        "language": said.language,
+        "texts_sha256": sha256_of_texts(said.texts) or None,
         "pilot": said.pilot,
         "simulated_participant": people.respondent.simulated,
         "simulated_rig": rig.simulated,
@@ -218,11 +224,12 @@ def _stated(
     }
 
 
-def _require_language(study: Study, language: str) -> None:
-    if language and language not in study.languages:
+def _require_texts(study: Study, texts: TextsByLanguage) -> None:
+    """Refuse texts, where there are any, in other languages than the study's."""
+    if texts and set(texts) != set(study.languages):
         raise InputError(
-            f"expected a language of the study ({', '.join(study.languages)}), got "
-            f"{shown(language)}; choose one, or add it to the study."
+            f"expected texts in each language of the study ({', '.join(study.languages)}), got "
+            f"them in {', '.join(texts)}; give those of all its languages, or none."
         )
 
 

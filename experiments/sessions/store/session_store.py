@@ -36,6 +36,7 @@ from tactileq.experiments.sessions.kept.overrides import Overrides
 from tactileq.experiments.sessions.kept.state import SessionState, state_of
 from tactileq.experiments.sessions.kept.stored_sessions import check_named, wrong_in
 from tactileq.experiments.sessions.kept.tables import GrowingTable
+from tactileq.experiments.sessions.kept.texts import TextsByLanguage, write_texts
 from tactileq.experiments.sessions.kept.traces import (
     HAND_COLUMNS,
     PRESENTATION_COLUMNS,
@@ -109,6 +110,7 @@ class SessionStore:
         manifest: SessionManifest,
         *,
         overrides: Overrides | None = None,
+        texts: TextsByLanguage | None = None,
     ) -> SessionStore:
         """Make the files of a session that has none yet, its manifest before all others.
 
@@ -120,12 +122,14 @@ class SessionStore:
             Written, with what is overridden, and forced to disk before anything is presented.
         overrides : Overrides, optional
             For sessions that go on against a rule.
+        texts : mapping of language to mapping of key to text, optional
+            What the participant reads, whose hashes the manifest states; written before it.
 
         Raises
         ------
         InputError
             If the session exists or is being run, comes before its day, or the folder holds data
-            of another study, of other models or of another kind of participants.
+            of another study, of other models or texts, or of another kind of participants.
         StoreError
             If the disk does not take the files; then there are none.
         """
@@ -136,6 +140,7 @@ class SessionStore:
             recorded = [*manifest.overrides]
             recorded += [record for record in overrides.recorded if record not in recorded]
             final = replace(manifest, overrides=tuple(recorded))
+            write_texts(files.root, texts or {})
             make_folder(files.folder)
             with locked(files.manifest):
                 refuse_begun(files)
@@ -170,6 +175,7 @@ class SessionStore:
         manifest: SessionManifest,
         *,
         overrides: Overrides | None = None,
+        texts: TextsByLanguage | None = None,
     ) -> SessionStore:
         """Continue with a session that was aborted or interrupted.
 
@@ -180,12 +186,14 @@ class SessionStore:
             different now is logged.
         overrides : Overrides, optional
             For sessions that go on against a rule.
+        texts : mapping of language to mapping of key to text, optional
+            As of `create`.
 
         Raises
         ------
         InputError
             If there is no such session, it is complete or being run, its log cannot be read, or
-            the study, the models or the kind of participant have changed.
+            the study, the models, the texts or the kind of participant have changed.
         StoreError
             If the disk does not take it.
         """
@@ -205,6 +213,7 @@ class SessionStore:
                 store = cls(files, stored, handle=handle, lock=lock)
                 try:
                     _check_open(store.before, stored, files=files)
+                    write_texts(files.root, texts or {})
                     now = {"changed": _changes(stored, manifest), "overrides": overrides.recorded}
                     store._open({"resumed": True, **now})
                 except BaseException:
@@ -392,8 +401,10 @@ def _check_unchanged(
     for what, name, key in (
         ("study", "study_sha256", "study"),
         ("models", "models_sha256", "models_sha256"),
+        ("texts", "texts_sha256", "texts_sha256"),
     ):
-        if stored.values[name] != now.values[name]:
+        recorded = name in stored.values and name in now.values
+        if recorded and stored.values[name] != now.values[name]:
             overrides.allow(
                 what,
                 f"expected the {what} that {files.stem} began with, got another "
@@ -407,5 +418,5 @@ def _changes(stored: SessionManifest, now: SessionManifest) -> dict[str, Any]:
     return {
         name: value
         for name, value in now.values.items()
-        if name not in kept and value != stored.values[name]
+        if name not in kept and value != stored.values.get(name)
     }

@@ -51,6 +51,7 @@ def publish(
     from tactileq.experiments.publishing.archive import COMMAND, DATA
     from tactileq.experiments.publishing.metadata import Publication
     from tactileq.experiments.sessions.bids.validator import bids_issues, said_of
+    from tactileq.experiments.sessions.kept.texts import texts_file
     from tactileq.experiments.study.study import Study
     from tactileq.modeling import InputError
     from tactileq.modeling.errors import counted
@@ -80,8 +81,10 @@ def publish(
     reported = (*_WITH_MODELS, "plan")
     given |= {name: Path(options[name]) for name in reported if options.get(name)}
     written.reads(*given.values())
+    read = found.manifests[0].texts_sha256 or {}
+    texts = {name: Path(DATA, texts_file(name, sha256)) for name, sha256 in read.items()}
     publication = Publication(
-        study=replace(ran, publication=stated.publication),
+        study=replace(ran, publication=stated.publication, texts=texts),
         data=data,
         models=places,
         stimuli=stimuli,

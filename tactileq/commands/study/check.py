@@ -26,6 +26,7 @@ def study_check(path: StudyArgument) -> None:
     places = ", ".join(f"{name} ({place})" for name, place in plan.models.items())
     print(f"models: one of each texture in {places}")
     print_models(sets, plan.textures)
+    _print_texts(plan)
     _print_sessions(plan)
     _print_balance(plan)
     _print_claims(plan)
@@ -39,13 +40,14 @@ def loaded(path: Path, reads: Callable[..., None] = lambda *paths: None) -> tupl
     InputError
         For a study or models that cannot be used.
     """
-    from tactileq.experiments.console.languages import require_texts
+    from tactileq.experiments.console.languages import texts_of_study
     from tactileq.experiments.study.models import load_model_sets
     from tactileq.experiments.study.study import Study
 
     reads(path)
     plan = Study.load(path)
-    require_texts(plan)
+    reads(*plan.texts.values())
+    texts_of_study(plan)
     if any(place.endswith(".toml") for place in plan.models.values()):
         with share_of("Compiling the scene") as advance:
             sets = load_model_sets(plan, path.parent, reads=reads, progress=advance)
@@ -53,6 +55,21 @@ def loaded(path: Path, reads: Callable[..., None] = lambda *paths: None) -> tupl
         sets = load_model_sets(plan, path.parent, reads=reads)
     sets.require(plan)
     return plan, sets
+
+
+def _print_texts(plan: Study) -> None:
+    """What participants read, and who has not read it yet."""
+    from tactileq.experiments.console.languages import texts_of_study
+
+    texts = texts_of_study(plan)
+    places = (f"{name} ({plan.texts.get(name, 'as shipped')})" for name in texts)
+    print(f"texts: {', '.join(places)}")
+    for name, of_language in texts.items():
+        if not of_language.proofread:
+            print(
+                f"note: no native speaker has read the texts in {name} yet; let one read them, and "
+                f"name a file with proofread = true, and what has to change, under texts."
+            )
 
 
 def _print_claims(plan: Study) -> None:

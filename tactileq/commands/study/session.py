@@ -17,6 +17,7 @@ from tactileq.printing import print_foreign_models, share_of
 if TYPE_CHECKING:
     TaskName = str
     from tactileq.experiments.console.console import Console
+    from tactileq.experiments.console.languages import Texts
     from tactileq.experiments.study.models import ModelSets
     from tactileq.experiments.study.study import Study
     from tactileq.rig.desk.walls import Walls
@@ -71,7 +72,7 @@ def session(
     Example: tactileq session --task absolute --subject 1 --rig rig.toml --data data
     """
     from tactileq.commands.study.experimenter import Terminal
-    from tactileq.experiments.console.languages import require_texts
+    from tactileq.experiments.console.languages import texts_of_study
     from tactileq.experiments.sessions.bids.export import export_session
     from tactileq.experiments.sessions.kept.log import SEAL_WRITTEN
     from tactileq.experiments.sessions.kept.overrides import Overrides
@@ -82,7 +83,7 @@ def session(
     from tactileq.experiments.tasks import task_named
 
     plan = Study.load(study)
-    require_texts(plan)
+    texts = texts_of_study(plan)
     sets, sources = models_of_study(plan, study, models=models, simplified=simplified, scene=scene)
     if resume and not language:
         language = _language_of(data, task=task, subject=subject, session=number)
@@ -93,6 +94,7 @@ def session(
         tell=print,
         resume=resume,
         sources=sources,
+        texts={name: of_language.by_key for name, of_language in texts.items()},
     )
     sets.require(plan, allow=Overrides(override).allow)
     print_foreign_models(sets, plan.textures)
@@ -103,9 +105,8 @@ def session(
     stamp = ", ".join(["pilot"] * pilot + ["simulated rig"] * device.simulated)
     if device.simulated:
         print("note: the rig is simulated; its data are marked as simulated.")
-    with open_console(
-        plan, language=language, stamp=stamp, fullscreen=fullscreen, screen=screen
-    ) as console:
+    read = texts[plan.language_of_session(language)]
+    with open_console(read, stamp=stamp, fullscreen=fullscreen, screen=screen) as console:
         try:
             result, manifest = run_session(
                 task_named(task),
@@ -228,15 +229,11 @@ def models_of_study(
         return load(progress=advance), sources
 
 
-def open_console(
-    plan: Study, *, language: str, stamp: str, fullscreen: bool, screen: int
-) -> Console:
-    """The console's window in the participant's language."""
+def open_console(texts: Texts, *, stamp: str, fullscreen: bool, screen: int) -> Console:
+    """The console's window with what the participant reads."""
     from tactileq.experiments.console.console import Console
 
-    return Console(
-        language=language or plan.languages[0], stamp=stamp, fullscreen=fullscreen, screen=screen
-    )
+    return Console(texts=texts, stamp=stamp, fullscreen=fullscreen, screen=screen)
 
 
 def print_timings(

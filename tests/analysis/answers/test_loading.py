@@ -550,6 +550,7 @@ def test_sessions_with_other_models_or_another_study_are_refused(
     [
         ("ModelsSHA256", {"canvas": {"full": "0a", "simplified": "2c"}}, "models"),
         ("StudySHA256", "ff", "study"),
+        ("TextsSHA256", {"en": "ff"}, "texts"),
         ("Pilot", True, "pilot"),
     ],
 )
@@ -558,7 +559,8 @@ def test_a_session_that_went_on_against_a_rule_is_told(
 ):
     path = write_task("absolute", absolute_rows)
     models = _models_of_all()
-    _describe(study_folder, ModelsSHA256=models, StudySHA256="00", Pilot=False)
+    fixed = {"StudySHA256": "00", "TextsSHA256": {"en": "00"}, "Pilot": False}
+    _describe(study_folder, ModelsSHA256=models, **fixed)
     sidecar = path.with_suffix(".json")
     record = {"what": what, "reason": "the disk was lost"}
     sidecar.write_text(json.dumps({key: value, "Overrides": [record]}))

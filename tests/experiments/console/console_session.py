@@ -21,6 +21,7 @@ import time
 from psychopy import visual
 
 from tactileq.experiments.console.console import Console
+from tactileq.experiments.console.languages import Texts
 from tactileq.experiments.sessions.loop.people import Intake, SessionAborted
 from tactileq.experiments.sessions.loop.surfaces import Surfaces
 from tactileq.experiments.study.questions import Question
@@ -136,7 +137,7 @@ def run(console, part):
 
 def hold(language, parts, *, done):
     with Console(
-        language=language,
+        texts=Texts.load(language),
         stamp="pilot",
         on_page=lambda page, handles: tell(page=page, handles=handles, shown=frames.shown),
     ) as console:

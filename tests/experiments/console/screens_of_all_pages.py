@@ -253,25 +253,31 @@ OWN = Question(
     text={
         "en": "How many hours a week have you worked with textiles, wood or metal over the last "
         "twelve months?",
+        "de": "Wie viele Stunden pro Woche haben Sie in den letzten zwölf Monaten mit Textilien, "
+        "Holz oder Metall gearbeitet?",
         "ja": "この一年間、一週間に平均して何時間くらい、布や木や金属を手で扱う仕事をしましたか",
     },
-    levels_text={"ja": tuple(f"一週間に{hours}時間から{hours + 9}時間まで" for hours in HOURS)},
+    levels_text={
+        "de": tuple(f"{hours} bis {hours + 9} Stunden in jeder Woche" for hours in HOURS),
+        "ja": tuple(f"一週間に{hours}時間から{hours + 9}時間まで" for hours in HOURS),
+    },
 )
 
 
 def look_at_all(screen, folder):
     language, _, size = screen.partition(":")
     width, height = map(int, size.split("x"))
+    texts = Texts.load(language)
     visitor = Visitor(screen, folder)
     with Console(
-        language=language,
+        texts=texts,
         stamp="pilot, simulated rig",
         size=(width, height),
         on_page=visitor.on_page,
     ) as console:
         visitor.sit_down(console._window)
         ask_everything(console, visitor)
-        announce_everything(console, visitor, Texts.load(language))
+        announce_everything(console, visitor, texts)
         try_everything(console, visitor)
 
 

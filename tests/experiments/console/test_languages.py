@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from tactileq.experiments.console import languages as module
 from tactileq.experiments.console.drawing import NARROW_EM, NOT_FIRST, NOT_LAST, wrapped
-from tactileq.experiments.console.languages import Texts, languages, require_texts
+from tactileq.experiments.console.languages import Texts, languages, texts_of_study
 from tactileq.experiments.console.page_runner import REASONS
 from tactileq.experiments.study.questions import Question
 from tactileq.experiments.study.study import Study
@@ -21,7 +21,7 @@ from tests.refusals import refused
 
 
 def test_every_language_has_every_text() -> None:
-    assert {"en", "ja"} <= set(languages())
+    assert {"de", "en", "ja"} <= set(languages())
     english = Texts.load("en").by_key
     for language in languages():
         texts = Texts.load(language).by_key
@@ -47,7 +47,8 @@ def test_keys_are_told_without_numbers_that_a_page_may_lack() -> None:
 
 
 def test_who_is_asked_for_thresholds_is_told_to_hold_the_pen_still() -> None:
-    for language, pen in (("en", "pen still"), ("ja", "ペンを動かさず")):
+    told = (("en", "pen still"), ("ja", "ペンを動かさず"), ("de", "den Stift ruhig"))
+    for language, pen in told:
         texts = Texts.load(language)
         for phase in ("training", "main"):
             assert pen in texts.of(f"threshold.{phase}.text")
@@ -63,28 +64,71 @@ def test_the_shipped_study_can_be_asked_in_every_language() -> None:
 
 
 def test_a_language_that_is_not_there_is_refused() -> None:
-    with refused(InputError, expected=["language", "en", "ja"], got=["'fr'", "fr.toml"]):
+    with refused(
+        InputError, expected=["language", "en", "ja"], got=["'fr'", 'texts = "fr.toml"', "en.toml"]
+    ) as told:
         Texts.load("fr")
+    # Nothing is to be changed in what is installed.
+    assert "beside" not in str(told.value)
 
 
 @pytest.mark.parametrize(
     ("line", "expected", "got"),
     [
         ('b = "{n} Dinge"', "c.d", "none"),
-        ('b = "{n} Dinge"\nc.d = "D"\ne = "E"', "English", "e"),
+        ('b = "{n} Dinge"\nc.d = "D"\ne = "E"', "English", "'e'"),
         ('b = "Dinge"\nc.d = "D"', ["n", "English", "b"], "none"),
+        ('b = "{n} {m}"\nc.d = "D"', ["n", "English", "b"], "m, n"),
         ('b = "{n Dinge"\nc.d = "D"', ["n", "English", "b"], "{"),
+        ('b = "{n} Dinge"\nc.d = 4', ["text", "c.d"], "4"),
+        ('b = "{n} Dinge"\nc.d = " "', ["text", "c.d"], "' '"),
+        ('proofread = "no"\nb = "{n} Dinge"\nc.d = "D"', ["true", "proofread"], "'no'"),
+        ("b = ", "TOML", "something else"),
     ],
 )
-def test_an_incomplete_language_is_refused(
+def test_a_file_that_is_no_language_is_refused(
     line: str, expected: object, got: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "en.toml").write_text('b = "{n} things"\n[c]\nd = "D"\n')
-    (tmp_path / "xx.toml").write_text(line)
+    own = tmp_path / "mine" / "xx.toml"
+    own.parent.mkdir()
+    own.write_text(line)
     monkeypatch.setattr(module, "FOLDER", tmp_path)
     assert Texts.load("en").of("b", n=3) == "3 things"
-    with refused(InputError, names='"xx"', expected=expected, got=[got, "xx.toml"]):
-        Texts.load("xx")
+    with refused(InputError, names=own, expected=expected, got=got) as told:
+        Texts.load("xx", own)
+    assert "\n" not in str(told.value)
+
+
+def test_a_study_may_change_single_texts_of_a_shipped_language(tmp_path: Path) -> None:
+    own = tmp_path / "de.toml"
+    own.write_text('[rest]\ntitle = "Kurze Rast"\n', encoding="utf-8")
+    texts, shipped = Texts.load("de", own), Texts.load("de")
+    assert texts.of("rest.title") == "Kurze Rast" != shipped.of("rest.title")
+    assert texts.by_key.keys() == shipped.by_key.keys()
+    assert texts.of("rest.text") == shipped.of("rest.text")
+
+
+def test_a_study_brings_a_language_of_its_own(tmp_path: Path) -> None:
+    english = (module.FOLDER / "en.toml").read_text(encoding="utf-8")
+    (tmp_path / "fr.toml").write_text(english.replace('"Consent"', '"Accord"'), encoding="utf-8")
+    for texts in ("fr.toml", {"fr": "fr.toml"}):
+        tables = {**Study.load().to_tables(), "languages": ["fr"], "texts": texts}
+        study = Study.from_tables(tables, folder=tmp_path)
+        assert texts_of_study(study)["fr"].of("consent.title") == "Accord"
+    (tmp_path / "fr.toml").write_text('[consent]\ntitle = "Accord"\n', encoding="utf-8")
+    with refused(InputError, names=tmp_path / "fr.toml", expected="keys", got="none"):
+        texts_of_study(study)
+
+
+def test_it_is_known_which_texts_no_native_speaker_has_read(tmp_path: Path) -> None:
+    assert Texts.load("en").proofread
+    assert not Texts.load("de").proofread
+    own = tmp_path / "de.toml"
+    own.write_text('rest.title = "Kurze Rast"')
+    assert not Texts.load("de", own).proofread  # of the others nothing was said
+    own.write_text("proofread = true")
+    assert Texts.load("de", own).proofread
 
 
 def test_a_question_without_a_translation_is_refused() -> None:
@@ -125,18 +169,18 @@ def test_a_study_in_a_language_without_texts_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shipped = Study.load()
-    require_texts(shipped)
+    assert list(texts_of_study(shipped)) == ["en", "ja"]
     with refused(InputError, expected=["language", "en", "ja"], got="'fr'"):
-        require_texts(replace(shipped, languages=("en", "fr")))
+        texts_of_study(replace(shipped, languages=("en", "fr")))
     for language in ("en", "ja"):
         texts = (module.FOLDER / f"{language}.toml").read_text(encoding="utf-8")
         (tmp_path / f"{language}.toml").write_text(texts, encoding="utf-8")
     with (tmp_path / "en.toml").open("a") as file:
         file.write('\n[new]\ntitle = "New"\n')
     monkeypatch.setattr(module, "FOLDER", tmp_path)
-    require_texts(replace(shipped, languages=("en",)))
-    with refused(InputError, expected=["new.title", '"ja"'], got="ja.toml"):
-        require_texts(shipped)
+    texts_of_study(replace(shipped, languages=("en",)))
+    with refused(InputError, expected=["new.title", "ja.toml"], got="none"):
+        texts_of_study(shipped)
 
 
 def test_stamps_are_translated() -> None:

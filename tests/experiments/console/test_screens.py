@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from fontTools.ttLib import TTFont
 
-from tactileq.experiments.console import screens
+from tactileq.experiments.console import drawing, screens
 from tactileq.experiments.console.drawing import BLUE, CONSOLE_ORANGE
 from tactileq.experiments.console.languages import Texts, languages
 from tactileq.experiments.study.study import Study
@@ -105,6 +106,17 @@ def pages(display: str, once_per_run: Any) -> list[dict[str, Any]]:
         return [json.loads(line) for line in shown.stdout.splitlines()]
 
     return once_per_run("pages-of-the-console", made)
+
+
+def test_every_letter_is_in_the_type_that_it_is_set_in() -> None:
+    """Else a page would show an empty box in its place."""
+    latin, bold = (set(TTFont(font).getBestCmap()) for font in drawing._latin_fonts())
+    (japanese,) = (set(TTFont(font).getBestCmap()) for font in drawing._japanese_fonts())
+    for language in languages():
+        for content in Texts.load(language).by_key.values():
+            there = japanese if any(map(drawing._is_wide, content)) else latin & bold
+            missing = {letter for letter in content if ord(letter) not in there}
+            assert not missing, (language, content)
 
 
 def test_every_page_stands_in_the_docs_under_its_title(pages: list[dict[str, Any]]) -> None:

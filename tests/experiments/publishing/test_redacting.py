@@ -107,6 +107,16 @@ def test_free_text_is_left_out_unless_it_is_asked_for(models: ModelSets, tmp_pat
         assert verify_data(copy).differences == ()
 
 
+def test_what_participants_read_is_copied(models: ModelSets, tmp_path: Path) -> None:
+    root, texts = tmp_path / "data", {"en": {"rest.title": "Time for a break"}}
+    run_one(root, small_study(TEXTURES), models, texts=texts)
+    (root / "sourcedata/texts_en_of_nobody.toml").write_text("notes")
+    redact(root, tmp_path / "copy", sources=SOURCES, described={})
+    (file,) = (tmp_path / "copy").glob("sourcedata/texts_*")
+    assert "Time for a break" in file.read_text()
+    assert verify_data(tmp_path / "copy").differences == ()
+
+
 def test_a_running_or_damaged_session_is_not_published(models: ModelSets, tmp_path: Path) -> None:
     root = tmp_path / "data"
     _, manifest = run_one(root, small_study(TEXTURES), models, respondent=Stopping(1, after=2))

@@ -285,6 +285,32 @@ def test_a_study_of_an_earlier_version_keeps_its_values_and_its_hash() -> None:
     assert Study.from_dict(study.to_dict()) == study
 
 
+def test_texts_of_ones_own_are_no_part_of_what_identifies_a_study(tmp_path: Path) -> None:
+    """What they say is in the data by its hash; the hash is that of the version before them."""
+    shipped = Study.load()
+    assert shipped.sha256 == "6c4d77728ef81c575fdf2bd5af6f9802801f80804b3585b468c57dd03c23ec84"
+    assert "texts" not in shipped.to_dict()
+    own = replace(shipped, texts={"ja": tmp_path / "ja.toml"})
+    assert (own.sha256, own.to_dict()) == (shipped.sha256, shipped.to_dict())
+
+
+def test_texts_are_files_beside_the_study_by_language(tmp_path: Path) -> None:
+    file = tmp_path / "study.toml"
+    line = 'languages = ["en", "ja"]'
+    shipped = SHIPPED_STUDY.read_text(encoding="utf-8")
+    for texts in ('"own/ja.toml"', '{ja = "own/ja.toml"}'):
+        file.write_text(shipped.replace(line, f"{line}\ntexts = {texts} #"), encoding="utf-8")
+        assert Study.load(file).texts == {"ja": tmp_path / "own/ja.toml"}
+    for texts, expected, got in (
+        ('"wording.toml"', "de.toml", "'wording.toml'"),
+        ("3", "de.toml", "3"),
+        ('"de.toml"', ["language", "en, ja"], "'de'"),
+    ):
+        file.write_text(shipped.replace(line, f"{line}\ntexts = {texts} #"), encoding="utf-8")
+        with refused(InputError, names=[file, "texts"], expected=expected, got=got):
+            Study.load(file)
+
+
 def test_the_rule_of_verdicts_is_part_of_the_plan() -> None:
     shipped = Study.load()
     assert (shipped.plan.rule, shipped.plan.few) == ("model", 0.15)

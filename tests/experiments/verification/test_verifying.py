@@ -256,3 +256,35 @@ def test_each_manifest_names_the_session_that_ended_before(finished: Path) -> No
     assert [(one["session"], one["seal"]) for one in named[1:]] == ended[:-1]
     for stem, seal in ended:
         assert lines(source(finished, stem, "log.jsonl"))[-1]["seal"] == seal
+
+
+def test_what_participants_read_must_be_there_as_it_was(models: ModelSets, tmp_path: Path) -> None:
+    texts = {"en": {"rest.title": "Time for a break"}}
+    run_one(tmp_path, small_study(TEXTURES), models, texts=texts)
+    run_one(tmp_path, small_study(TEXTURES), models, task="relative")  # of which none is known
+    assert verify_data(tmp_path).differences == ()
+    (file,) = tmp_path.glob("sourcedata/texts_en_*.toml")
+    edit_text(file, "Time", "No time")
+    (found,) = verify_data(tmp_path).differences
+    assert found.place == file.relative_to(tmp_path).as_posix()
+    file.unlink()
+    (found,) = verify_data(tmp_path).differences
+    assert (found.place, found.sentence.rpartition(" ")[2]) == (f"sourcedata/{file.name}", "none")
+
+
+def test_other_texts_without_a_reason_are_found(models: ModelSets, tmp_path: Path) -> None:
+    study = small_study(TEXTURES)
+    run_one(tmp_path, study, models, texts={"en": {"rest.title": "Time for a break"}})
+    other = {"en": {"rest.title": "Have a rest"}}
+    again = {"subject": 2, "texts": other, "override": "a spelling mistake"}
+    run_one(tmp_path, study, models, respondent=Stopping(2, after=2), **again)
+    again["texts"] = {"en": {"rest.title": "Rest your hand"}}
+    run_one(tmp_path, study, models, resume=True, **again)
+    assert len(list(tmp_path.glob("sourcedata/texts_*"))) == 3
+    assert verify_data(tmp_path).differences == ()
+    description = tmp_path / "dataset_description.json"
+    stated = json.loads(description.read_text())
+    stated["TextsSHA256"]["en"] = "0" * 64
+    description.write_text(json.dumps(stated))
+    (found,) = verify_data(tmp_path).differences
+    assert found.place == description.name

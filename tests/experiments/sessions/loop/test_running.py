@@ -6,6 +6,7 @@ import errno
 import os
 import signal
 import stat
+import tomllib
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
@@ -412,6 +413,57 @@ def test_another_language_on_going_on_is_noted_and_the_manifest_stays(
     assert SessionManifest.load(manifest).language == "ja"
     opened = [e for e in read_log(log_beside(manifest)).events if e["event"] == "opened"]
     assert [event.get("changed", {}).get("language") for event in opened] == [None, None, "en"]
+
+
+TEXTS = {"en": {"rest.title": 'Time for a "break"', "keys": "Keys:\nTab, \\ and \x7f"}}
+
+
+def test_what_is_read_is_stored_before_the_first_trial(
+    run: Callable[..., Any], tmp_path: Path
+) -> None:
+    class Watchful(Scripted):
+        def rate(self, trial: Any, surfaces: Any) -> Any:
+            self.seen = [path.read_text("utf-8") for path in tmp_path.rglob("texts_en_*.toml")]
+            return super().rate(trial, surfaces)
+
+    respondent = Watchful()
+    _, manifest = run(respondent, texts=TEXTS)
+    assert [tomllib.loads(text) for text in respondent.seen] == [TEXTS["en"]]
+    assert list(SessionManifest.load(manifest).texts_sha256 or {}) == ["en"]
+
+
+def test_without_what_is_read_no_session_begins(
+    run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(path: Path, text: str) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+    monkeypatch.setattr("tactileq.experiments.sessions.kept.texts.write_text", refuse)
+    with refused(StoreError, names="full disk"):
+        run(texts=TEXTS)
+    assert not list(tmp_path.rglob("*_manifest.json"))
+    assert not list(tmp_path.rglob("texts_*"))
+    _, manifest = run(Tired(2))
+    before = log_beside(manifest).read_bytes()
+    with refused(StoreError, names="full disk"):
+        run(texts=TEXTS, resume=True)
+    assert log_beside(manifest).read_bytes() == before
+    assert run(resume=True)[0].completed  # nobody holds the session any more
+
+
+def test_a_session_of_before_texts_were_stored_goes_on(run: Callable[..., Any]) -> None:
+    _, manifest = run(Tired(2))
+    assert "texts_sha256" not in SessionManifest.load(manifest).values
+    result, _ = run(resume=True, texts=TEXTS)
+    assert result.completed
+    *_, opened = (e for e in read_log(log_beside(manifest)).events if e["event"] == "opened")
+    stored = {path.name for path in manifest.parents[2].glob("texts_*")}
+    assert {f"texts_en_{opened['changed']['texts_sha256']['en'][:16]}.toml"} == stored
+
+
+def test_texts_of_other_languages_than_the_studys_are_refused(run: Callable[..., Any]) -> None:
+    with refused(InputError, expected=["language", "en"], got="de"):
+        run(texts={"de": TEXTS["en"]})
 
 
 @pytest.mark.parametrize("number", [errno.EIO, errno.ENOSPC])
