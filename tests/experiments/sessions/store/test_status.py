@@ -64,7 +64,8 @@ def damage(files):
 
 # Of one person: what was done, one after another, and what is due then.
 CRASHED, DAMAGED = None, "damaged"
-A, R1, R2, O, T = ("absolute", 1), ("relative", 1), ("relative", 2), ("oddity", 1), ("threshold", 1)
+A, ODD, T = ("absolute", 1), ("oddity", 1), ("threshold", 1)
+R1, R2 = ("relative", 1), ("relative", 2)
 
 
 @pytest.mark.parametrize(
@@ -73,13 +74,13 @@ A, R1, R2, O, T = ("absolute", 1), ("relative", 1), ("relative", 2), ("oddity", 
         # Interrupted: to be resumed, whatever was never begun before it.
         ([(R1, "aborted")], "relative 1, with --resume"),
         ([(R1, CRASHED)], "relative 1, with --resume"),
-        ([(A, "complete"), (O, "aborted")], "oddity, with --resume"),
+        ([(A, "complete"), (ODD, "aborted")], "oddity, with --resume"),
         ([(R1, "complete"), (R2, "aborted")], "relative 2, with --resume"),
         ([(T, CRASHED)], "threshold, with --resume"),
         # Of two, the one that was active last.
         ([(A, "aborted"), (R1, "aborted")], "relative 1, with --resume"),
-        ([(A, CRASHED), (O, CRASHED)], "oddity, with --resume"),
-        ([(O, "aborted"), (A, "aborted")], "absolute, with --resume"),
+        ([(A, CRASHED), (ODD, CRASHED)], "oddity, with --resume"),
+        ([(ODD, "aborted"), (A, "aborted")], "absolute, with --resume"),
         ([(A, "aborted"), (R1, "complete")], "absolute, with --resume"),
         # Damaged: after what can go on, before what was never begun.
         ([(A, DAMAGED), (R1, "aborted")], "relative 1, with --resume"),
@@ -88,8 +89,8 @@ A, R1, R2, O, T = ("absolute", 1), ("relative", 1), ("relative", 2), ("oddity", 
         ([(A, "complete"), (R1, "complete"), (T, DAMAGED)], "threshold is damaged"),
         # Never begun: a task that was begun is finished before another.
         ([(R1, "complete")], "relative 2, not before tomorrow"),
-        ([(O, "complete")], "absolute"),
-        ([(O, "complete"), (R1, "complete")], "relative 2, not before tomorrow"),
+        ([(ODD, "complete")], "absolute"),
+        ([(ODD, "complete"), (R1, "complete")], "relative 2, not before tomorrow"),
         ([(A, "complete")], "relative 1"),
     ],
 )
