@@ -65,6 +65,11 @@ class RatedTrial(Protocol):
     def trial(self) -> int: ...
 
     @property
+    def phase(self) -> str:
+        """Either "main", or "training", whose pages are marked."""
+        ...
+
+    @property
     def texture(self) -> str: ...
 
     @property
@@ -81,6 +86,11 @@ class ChoiceTrial(Protocol):
 
     @property
     def trial(self) -> int: ...
+
+    @property
+    def phase(self) -> str:
+        """Either "main", or "training", whose pages are marked."""
+        ...
 
     @property
     def texture(self) -> str: ...
