@@ -337,7 +337,7 @@ class RatingScale:
 
 
 class FocusRing:
-    """Shows which widget the keys go to: until the mouse is pressed, and from the next key on again.
+    """Shows where keys go: until the mouse is pressed, and from the next key on again.
 
     Who works with the mouse alone sees it on the first page at most.
     """

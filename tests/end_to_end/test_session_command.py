@@ -165,14 +165,14 @@ def log_of(study: Path) -> list[dict[str, Any]]:
 
 
 def press_until(done: Callable[[], bool], display: str, process: subprocess.Popen[str]) -> None:
-    """Press Tab and Enter now and then, as who goes on to the next page, until it has happened."""
+    """Press Enter now and then, as who goes on to the next page, until it has happened."""
 
     def pressed() -> bool:
         if done():
             return True
         assert process.poll() is None, process.communicate()[1]
         subprocess.run(
-            ["xdotool", "key", "Tab", "Return"], env={**os.environ, "DISPLAY": display}, check=True
+            ["xdotool", "key", "Return"], env={**os.environ, "DISPLAY": display}, check=True
         )
         time.sleep(0.1)
         return False

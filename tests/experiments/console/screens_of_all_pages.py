@@ -4,7 +4,8 @@
 
 Standard output: one JSON object per page, {"screen": "en:1024x768", "page": …,
 "texts": [[words, box]], "shapes": [box], "fills": [color] of the shapes, "places": [[x, y]] of the
-texts, "colors": [[color, that of what is behind it]] of the texts}; boxes are (left, bottom, right, top), all in pixels from the window's middle. Each page is
+texts, "colors": [[color, that of what is behind it]] of the texts}; boxes are (left, bottom, right,
+top), all in pixels from the window's middle. Each page is
 kept in the folder as a picture; for the folder "-", none is.
 """
 
