@@ -29,6 +29,8 @@ from tests.rig.waiting import wait_until
 from tests.two_surfaces import save_two_surfaces
 
 WORDS = ("session", "--task", "absolute", "--study", "study.toml", "--data", "data")
+# In the middle of a screen of 1920 x 1080: the left button of a page, and beside that of others.
+YES = ("760", "732")
 SECONDS = 500.0  # for a hang, not for speed
 
 
@@ -165,14 +167,17 @@ def log_of(study: Path) -> list[dict[str, Any]]:
 
 
 def press_until(done: Callable[[], bool], display: str, process: subprocess.Popen[str]) -> None:
-    """Press Enter now and then, as who goes on to the next page, until it has happened."""
+    """Go on to the next page now and then until it has happened: by Enter, which on the page that
+    asks for the code has no button to press, and by the mouse where that page has its yes."""
 
     def pressed() -> bool:
         if done():
             return True
         assert process.poll() is None, process.communicate()[1]
         subprocess.run(
-            ["xdotool", "key", "Return"], env={**os.environ, "DISPLAY": display}, check=True
+            ["xdotool", "mousemove", *YES, "click", "1", "key", "Return"],
+            env={**os.environ, "DISPLAY": display},
+            check=True,
         )
         time.sleep(0.1)
         return False
