@@ -35,7 +35,9 @@ def main() -> None:
         for page in sorted(Path(folder).glob("*.png")):
             small = Image.open(page).convert("RGB").resize(SIZE, Image.Resampling.LANCZOS)
             name = page.name.partition(" ")[0]
-            small.quantize(COLORS).save(PICTURES / f"{name}.png", optimize=True)
+            # By what they cover: by the median, a colour that only a line of text has is lost.
+            few = small.quantize(COLORS, method=Image.Quantize.MAXCOVERAGE)
+            few.save(PICTURES / f"{name}.png", optimize=True)
 
 
 if __name__ == "__main__":

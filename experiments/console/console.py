@@ -127,7 +127,7 @@ class Console:
 
     def choose(self, trial: ChoiceTrial, surfaces: Surfaces) -> Choice:
         """Choose one of the virtual surfaces."""
-        return trial_pages.choose(self._runner, _task_of(trial), surfaces)
+        return trial_pages.choose(self._runner, trial, surfaces, task=_task_of(trial))
 
 
 def _task_of(trial: object) -> Task:

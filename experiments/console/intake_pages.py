@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
+from math import ceil, floor
 
-from tactileq.experiments.console.drawing import CARD, CONSOLE_GREY, CONSOLE_ORANGE, PALE, text
-from tactileq.experiments.console.page_runner import PageRunner
+from tactileq.experiments.console.drawing import BLUE, CARD, CONSOLE_GREY, SMALL_HEIGHT, text
+from tactileq.experiments.console.page_runner import NOTICE_Y, PageRunner
 from tactileq.experiments.console.widgets import Button
 from tactileq.experiments.sessions.loop.people import Intake, SessionAborted
-from tactileq.experiments.study.questions import MOST_DIGITS, MOST_LEVELS, Question
+from tactileq.experiments.study.questions import (
+    MOST_DIGITS,
+    MOST_LEVELS,
+    NOT_SAID,
+    Question,
+)
 
 ANOTHER = "the code is another person's"
 COLUMN_WIDTHS = (0.6, 0.5, 0.38)  # where answers stand in one column, in two, in three
 ROWS = MOST_LEVELS // len(COLUMN_WIDTHS)  # of answers below each other
+NUMBER_NOTICE_Y = 0.245  # above what is typed
+DECLINE_AT, DECLINE_SIZE = (0.42, -0.385), (0.42, 0.066)  # beside the button that goes on
+MOST_TYPED = MOST_DIGITS + 1  # one more, so that a number can be seen to be too large
 DIGIT_PLACES = {
     str(digit): ((digit - 1) % 3 - 1, -((digit - 1) // 3)) for digit in range(1, 10)
 } | {"0": (0, -3)}
@@ -70,7 +80,7 @@ def message(runner: PageRunner, page: str, *, values: dict[str, object]) -> None
             runner.title(of(f"{page}.title", **values), y=0.24),
             runner.body(of(f"{page}.text", **values), y=0.03),
         ],
-        focus=proceed,
+        goes_on=proceed,
         stoppable=not last,
     )
 
@@ -94,13 +104,26 @@ def _ask(runner: PageRunner, page: str, *, yes: str, no: str, values: dict[str, 
             runner.body(runner.texts.of(f"{page}.text", **values), y=0.03),
             runner.keys(runner.texts.of("keys")),
         ],
+        notice=runner.notice(NOTICE_Y),
     )
     return said[-1]
 
 
 def answer(runner: PageRunner, question: Question) -> str | int:
-    """The answer to one question: one of its levels, or a number in its range."""
+    """The answer to one question: one of its levels, a number in its range, or `NOT_SAID`."""
     return _level(runner, question) if question.levels else _number(runner, question)
+
+
+def _decline(runner: PageRunner, action: Callable[[], None]) -> Button:
+    """The button of who prefers not to answer."""
+    return runner.button(
+        "decline",
+        runner.texts.of("question.decline"),
+        at=DECLINE_AT,
+        size=DECLINE_SIZE,
+        action=action,
+        height=SMALL_HEIGHT,
+    )
 
 
 # --- One of several answers -----------------------------------------------------------------
@@ -121,21 +144,30 @@ def _level(runner: PageRunner, question: Question) -> str:
         )
         for index, level in enumerate(question.levels)
     ]
-    proceed = runner.proceed()
+    proceed, notice = runner.proceed(), runner.notice(NOTICE_Y)
+    answers = dict(zip(question.levels, buttons, strict=True))
+    if not question.has_refusal:
+        answers[NOT_SAID] = _decline(runner, partial(picked.append, NOT_SAID))
+    for button in answers.values():
+        button.then = proceed
 
     def update() -> None:
-        proceed.enabled = bool(picked)
-        for level, button in zip(question.levels, buttons, strict=True):
+        proceed.needs = "" if picked else runner.texts.of("question.choose")
+        notice.say(proceed.needs)
+        for level, button in answers.items():
             button.lit = picked[-1:] == [level]
 
     runner.show(
         f"question {question.name}",
-        widgets=[*buttons, proceed],
+        widgets=[*answers.values(), proceed],
         decoration=[
             runner.title(runner.texts.question(question), y=0.34),
             *runner.foot(runner.texts.of("keys")),
         ],
         update=update,
+        focus=buttons[0],
+        goes_on=proceed,
+        notice=notice,
     )
     return picked[-1]
 
@@ -144,18 +176,17 @@ def _level(runner: PageRunner, question: Question) -> str:
 
 
 class _Typed:
-    """The digits typed so far, in a frame; above them what may be typed, orange where it is not."""
+    """The digits typed so far, in a frame, unless the participant prefers not to answer."""
 
-    def __init__(self, runner: PageRunner, *, least: float, most: float) -> None:
+    def __init__(self, runner: PageRunner, question: Question) -> None:
         from psychopy import visual
 
-        self.digits = ""
-        self._least, self._most = least, most
-        asked = runner.texts.of("question.range", least=f"{least:g}", most=f"{most:g}")
-        self._asked = {
-            wrong: runner.remark(asked, y=0.245, color=CONSOLE_ORANGE if wrong else CONSOLE_GREY)
-            for wrong in (False, True)
-        }
+        assert question.least is not None
+        assert question.most is not None
+        self.declined = False
+        self._digits = ""
+        self._least, self._most = question.least, question.most
+        self._of = runner.texts.of
         at = (0.0, 0.17)
         self._frame = visual.Rect(
             runner.window,
@@ -163,67 +194,96 @@ class _Typed:
             size=(0.29, 0.075),
             units="height",
             fillColor=CARD,
-            lineColor=PALE,
+            lineColor=BLUE,
             lineWidth=2,
             autoLog=False,
         )
         self._text = text(runner.window, "", at=at, height=0.046)
 
     @property
-    def number(self) -> int | None:
-        """None before the first digit."""
-        return int(self.digits) if self.digits else None
+    def answer(self) -> int | str:
+        """The number, or `NOT_SAID`; only where nothing is needed."""
+        return NOT_SAID if self.declined else int(self._digits)
 
     @property
-    def inside(self) -> bool:
-        """Whether the number is one that may be answered."""
-        return self.number is not None and self._least <= self.number <= self._most
+    def range(self) -> str:
+        """What may be typed."""
+        return self._of("question.range", least=f"{self._least:g}", most=f"{self._most:g}")
 
     @property
-    def wrong(self) -> bool:
-        """Whether no further digit can bring the number into the range."""
-        return self.number is not None and self.number > self._least and not self.inside
+    def needs(self) -> str:
+        """Why this is no answer; empty where it is one."""
+        if self.declined:
+            return ""
+        if not self._digits:
+            return self.range
+        if int(self._digits) < self._least:
+            return self._of("question.too_small", least=f"{ceil(self._least)}")
+        if int(self._digits) > self._most:
+            return self._of("question.too_large", most=f"{floor(self._most)}")
+        return ""
+
+    @property
+    def hopeless(self) -> bool:
+        """Whether no further digit can make it an answer."""
+        return bool(self._digits) and not any(
+            int(self._digits + "0" * more) <= self._most
+            and int(self._digits + "9" * more) >= self._least
+            for more in range(MOST_TYPED - len(self._digits) + 1)
+        )
 
     def add(self, digit: str) -> None:
         """Type a digit."""
-        self.digits = (self.digits + digit)[:MOST_DIGITS]
+        self.declined = False
+        self._digits = (self._digits + digit)[:MOST_TYPED]
 
     def delete(self) -> None:
         """Take the last digit back."""
-        self.digits = self.digits[:-1]
+        self._digits = self._digits[:-1]
+
+    def decline(self) -> None:
+        """Leave the question unanswered, unless a digit is typed after all."""
+        self.declined = True
+        self._digits = ""
 
     def draw(self) -> None:
-        """The range, the frame and the digits."""
-        self._text.text = self.digits
-        for part in (self._asked[self.wrong], self._frame, self._text):
+        """The frame and the digits."""
+        self._text.text = self._digits
+        for part in (self._frame, self._text):
             part.draw()
 
 
-def _number(runner: PageRunner, question: Question) -> int:
-    assert question.least is not None
-    assert question.most is not None
-    typed = _Typed(runner, least=question.least, most=question.most)
+def _number(runner: PageRunner, question: Question) -> int | str:
+    typed = _Typed(runner, question)
     pad = _digit_pad(runner, typed)
-    proceed = runner.proceed()
+    decline = _decline(runner, typed.decline)
+    proceed, notice = runner.proceed(), runner.notice(NUMBER_NOTICE_Y)
+    decline.then = proceed
 
     def update() -> None:
-        proceed.enabled = typed.inside
+        decline.lit = typed.declined
+        proceed.needs = typed.needs
+        # A number that only lacks digits is no mistake yet.
+        ranged = typed.needs if typed.hopeless else typed.range
+        notice.say(ranged, warns=typed.hopeless)
 
     shortcuts = {name.removeprefix("digit "): button for name, button in pad.items()}
     delete = shortcuts.pop("delete")
     runner.show(
         f"question {question.name}",
-        widgets=[*pad.values(), proceed],
+        # Digits are typed: the pad, which is for the mouse, comes last.
+        widgets=[proceed, decline, *pad.values()],
         decoration=[
             runner.title(runner.texts.question(question), y=0.34),
             typed,
             *runner.foot(runner.texts.of("keys")),
         ],
         update=update,
+        goes_on=proceed,
+        notice=notice,
         shortcuts={**shortcuts, "backspace": delete, "delete": delete},
     )
-    assert typed.number is not None
-    return typed.number
+    return typed.answer
 
 
 def _digit_pad(runner: PageRunner, typed: _Typed) -> dict[str, Button]:

@@ -10,6 +10,7 @@ from typing import Any
 from tactileq.experiments.console.drawing import CONSOLE_ORANGE
 from tactileq.experiments.console.events import KeyPress, Keys, Mouse
 from tactileq.experiments.console.languages import Texts
+from tactileq.experiments.console.notice import Notice
 from tactileq.experiments.console.page import Page
 from tactileq.experiments.console.parts import PageParts
 from tactileq.experiments.console.widgets import Button, FocusRing, Widget
@@ -22,6 +23,7 @@ FRAME_PAUSE_S = 0.004  # keeps a display without vertical synchronisation from s
 NOT_STATED = "not stated"  # first of all, since nobody owes a reason
 REASONS = (NOT_STATED, "tired", "discomfort", "time", "device", "other")
 REASONS_TOP, REASONS_PITCH = 0.145, 0.08
+NOTICE_Y = -0.32  # of pages with their buttons at the foot
 
 # Called when a page has come up: its name, and the window's pixel (from the top left) of each
 # handle.
@@ -77,7 +79,9 @@ class PageRunner(PageParts):
         surfaces: Surfaces | None = None,
         until: Callable[[], bool] | None = None,
         focus: Widget | None = None,
+        goes_on: Button | None = None,
         shortcuts: Mapping[str, Button] | None = None,
+        notice: Notice | None = None,
         stoppable: bool = True,
     ) -> None:
         """Show a page until it is finished.
@@ -86,7 +90,7 @@ class PageRunner(PageParts):
         ----------
         name : str
             By which tests know it.
-        widgets, decoration, focus, shortcuts
+        widgets, decoration, focus, goes_on, shortcuts, notice
             As of `Page`.
         update : callable
             Called before each frame and after each event.
@@ -111,7 +115,9 @@ class PageRunner(PageParts):
             decoration=[*stamp, *decoration],
             ring=self._ring,
             focus=focus,
+            goes_on=goes_on,
             shortcuts=shortcuts,
+            notice=notice,
         )
         ended = until or (lambda: False)
         self._begin(page, update, surfaces=surfaces)
@@ -244,6 +250,8 @@ class PageRunner(PageParts):
                 self.keys(of("keys")),
             ],
             update=update,
+            focus=go_on,  # who came here by mistake is back by one key
+            notice=self.notice(NOTICE_Y),
             stoppable=False,
         )
         return said[-1] if said else None

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from tactileq.experiments.console.drawing import (
     BLUE,
+    CARD,
     CONSOLE_GREY,
     CONSOLE_ORANGE,
+    INK,
     PALE,
     SMALL_HEIGHT,
     TEXT_HEIGHT,
@@ -19,6 +22,7 @@ from tactileq.experiments.console.drawing import (
     text,
 )
 from tactileq.experiments.console.languages import Texts
+from tactileq.experiments.console.notice import Notice
 from tactileq.experiments.console.widgets import Button
 
 # --- Parameters -----------------------------------------------------------------------------
@@ -27,6 +31,7 @@ TOP_Y, FOOT_Y = 0.462, -0.465
 HALF_WIDTH = 0.645  # of what every window shows
 FOOT_HEIGHT = 0.02
 BAR = (0.24, 0.006)
+PRACTICE_X, PRACTICE_SIZE = 0.4, (0.2, 0.044)
 
 
 class PageParts:
@@ -63,11 +68,23 @@ class PageParts:
             color=CONSOLE_GREY,
         )
 
-    def remark(self, content: str, *, y: float, color: str = CONSOLE_GREY) -> Any:
+    def remark(
+        self, content: str, *, y: float, color: str = CONSOLE_GREY, bold: bool = False
+    ) -> Any:
         """A line in small type."""
         return fitted(
-            self.window, content, box=(1.2, 0.08), height=SMALL_HEIGHT, at=(0.0, y), color=color
+            self.window,
+            content,
+            box=(1.2, 0.08),
+            height=SMALL_HEIGHT,
+            at=(0.0, y),
+            color=color,
+            bold=bold,
         )
+
+    def notice(self, y: float) -> Notice:
+        """The line that says what is needed, and why something was refused."""
+        return Notice(partial(self.remark, y=y), keys=self.texts.of("keys"))
 
     def button(
         self,
@@ -145,6 +162,21 @@ class PageParts:
             bold=True,
             anchor="left",
         )
+
+    def practice_mark(self) -> list[Any]:
+        """What every page of a trial for practice is marked with."""
+        at = (PRACTICE_X, TOP_Y)
+        return [
+            card(self.window, box=(*at, *PRACTICE_SIZE), color=INK),
+            text(
+                self.window,
+                self.texts.of("practice"),
+                at=at,
+                height=SMALL_HEIGHT,
+                color=CARD,
+                bold=True,
+            ),
+        ]
 
     def stop_button(self, action: Callable[[], None]) -> Button:
         """The small button in the corner of every page."""

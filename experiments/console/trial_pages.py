@@ -9,7 +9,7 @@ from typing import Any
 from tactileq.experiments.console.drawing import CONSOLE_ORANGE, INK, SMALL_HEIGHT, Point
 from tactileq.experiments.console.page_runner import PageRunner
 from tactileq.experiments.console.widgets import Button, RatingScale
-from tactileq.experiments.sessions.loop.people import Choice, RatedTrial, Rating
+from tactileq.experiments.sessions.loop.people import Choice, ChoiceTrial, RatedTrial, Rating
 from tactileq.experiments.sessions.loop.surfaces import Surfaces
 from tactileq.experiments.sessions.loop.task import Task
 
@@ -34,13 +34,14 @@ def rate(runner: PageRunner, trial: RatedTrial, surfaces: Surfaces) -> Rating:
         action=surfaces.present_virtual,
     )
     proceed = runner.proceed()
-    needed = _ChangingRemark(runner, y=-0.305)
+    notice = runner.notice(-0.305)
 
     def update() -> None:
         shows_real = surfaces.shows_real if surfaces.started else _begins_real(trial)
         real.lit, virtual.lit = shows_real, not shows_real
-        proceed.enabled = surfaces.switches > 0 and all(s.rated for s in scales.values())
-        needed.say("" if proceed.enabled else of("absolute.needed"))
+        ready = surfaces.switches > 0 and all(s.rated for s in scales.values())
+        proceed.needs = "" if ready else of("absolute.needed")
+        notice.say(proceed.needs)
 
     runner.show(
         "rate",
@@ -49,11 +50,14 @@ def rate(runner: PageRunner, trial: RatedTrial, surfaces: Surfaces) -> Rating:
             runner.title(of("absolute.question")),
             runner.remark(of("surface.felt_now"), y=0.212),
             *(runner.card(y + 0.012, 0.2) for y in SCALES_Y.values()),
-            needed,
+            *_mark(runner, trial),
             *runner.foot(of("absolute.keys")),
         ),
         surfaces=surfaces,
         update=update,
+        focus=scales["magnitude"],
+        goes_on=proceed,
+        notice=notice,
         shortcuts={"r": real, "v": virtual},
     )
     return Rating(
@@ -63,18 +67,20 @@ def rate(runner: PageRunner, trial: RatedTrial, surfaces: Surfaces) -> Rating:
     )
 
 
-def choose(runner: PageRunner, task: Task, surfaces: Surfaces) -> Choice:
+def choose(runner: PageRunner, trial: ChoiceTrial, surfaces: Surfaces, *, task: Task) -> Choice:
     """Per virtual surface a numbered button to feel it and one below to choose it; one to confirm,
     and one for the real surface in tasks that have one.
 
     A surface can be chosen once it has been felt; feeling another one leaves the choice as it is.
     """
-    of = runner.texts.of
+    of, of_task = runner.texts.of, partial(runner.texts.of_task, task.name)
     real = _real(runner, surfaces, at=(0.0, 0.3)) if task.mounts else None
     numbered = [_numbered(runner, index, surfaces) for index in range(surfaces.count)]
     answers = [_answer(runner, index, surfaces) for index in range(surfaces.count)]
     confirm = runner.proceed(of("choice.confirm"), y=-0.36)
-    remark = _ChangingRemark(runner, y=-0.27)
+    notice = runner.notice(-0.27)
+    for button in answers:
+        button.then = confirm
 
     def update() -> None:
         # What the page announces: the task begins with it.
@@ -85,11 +91,16 @@ def choose(runner: PageRunner, task: Task, surfaces: Surfaces) -> Choice:
             real.lit = shows_real
         for index, button in enumerate(numbered):
             button.lit = shown == index and not shows_real
+            spent = surfaces.bursts and index in surfaces.felt
+            button.needs = of_task("surface.felt_now") if spent else ""
         for index, button in enumerate(answers):
-            button.enabled = index in surfaces.felt
+            felt = index in surfaces.felt
+            button.needs = "" if felt else of_task("choice.feel_first", number=index + 1)
             button.lit = surfaces.chosen == index
-        confirm.enabled = surfaces.chosen is not None and _remaining(surfaces) == 0
-        remark.say(_remark(partial(runner.texts.of_task, task.name), surfaces))
+        said = _remark(of_task, surfaces)
+        ready = surfaces.chosen is not None and _remaining(surfaces) == 0
+        confirm.needs = "" if ready else said
+        notice.say(said)
 
     reals = [] if real is None else [real]
     runner.show(
@@ -97,13 +108,16 @@ def choose(runner: PageRunner, task: Task, surfaces: Surfaces) -> Choice:
         widgets=(*reals, *numbered, *answers, confirm),
         decoration=(
             runner.title(of(f"{task.name}.question")),
-            runner.remark(runner.texts.of_task(task.name, "surface.felt_now"), y=0.225),
+            runner.remark(of_task("surface.felt_now"), y=0.225),
             runner.card(0.0, 0.03 + ROW_PITCH * _rows(surfaces.count)),
-            remark,
+            *_mark(runner, trial),
             *runner.foot(of("choice.keys")),
         ),
         surfaces=surfaces,
         update=update,
+        focus=numbered[0],
+        goes_on=confirm,
+        notice=notice,
         shortcuts={
             **{str(number): button for number, button in enumerate(numbered[:9], start=1)},
             **{f"ctrl+{number}": button for number, button in enumerate(answers[:9], start=1)},
@@ -112,6 +126,11 @@ def choose(runner: PageRunner, task: Task, surfaces: Surfaces) -> Choice:
     )
     assert surfaces.chosen is not None
     return Choice(button=surfaces.chosen, response_time_s=surfaces.response_time_s)
+
+
+def _mark(runner: PageRunner, trial: RatedTrial | ChoiceTrial) -> list[Any]:
+    """That a trial is for practice, if it is."""
+    return runner.practice_mark() if trial.phase == "training" else []
 
 
 def _begins_real(trial: RatedTrial) -> bool:
@@ -193,23 +212,3 @@ def _remark(of: Callable[..., str], surfaces: Surfaces) -> str:
     if count := _remaining(surfaces):
         sentence += "\n" + of("choice.remaining", count=count)
     return sentence
-
-
-class _ChangingRemark:
-    """A remark whose words change; its stimulus is created again when they do."""
-
-    def __init__(self, runner: PageRunner, *, y: float) -> None:
-        self._runner, self._y = runner, y
-        self._words = ""
-        self._drawn: Any = None
-
-    def say(self, words: str) -> None:
-        """Show these words from now on."""
-        if words != self._words:
-            self._words = words
-            self._drawn = self._runner.remark(words, y=self._y) if words else None
-
-    def draw(self) -> None:
-        """Draw the words, if there are any."""
-        if self._drawn is not None:
-            self._drawn.draw()

@@ -37,7 +37,7 @@ class Widget(Protocol):
     """What a page needs of the things on it."""
 
     name: str
-    enabled: bool
+    needs: str  # why it cannot be pressed now; empty where it can
 
     @property
     def box(self) -> Box:
@@ -45,7 +45,7 @@ class Widget(Protocol):
         ...
 
     def contains(self, point: Point) -> bool:
-        """Whether the widget reacts to a press at this point."""
+        """Whether a press at this point is one on the widget."""
         ...
 
     def press(self, point: Point) -> None:
@@ -78,7 +78,7 @@ class Widget(Protocol):
 
 
 class Button:
-    """A button that acts when it is pressed and let go on it, while enabled.
+    """A button that acts when it is pressed and let go on it, while nothing else is needed first.
 
     Parameters
     ----------
@@ -91,6 +91,15 @@ class Button:
         Of the button while it is lit.
     height : float
         Of the label.
+
+    Attributes
+    ----------
+    needs : str
+        Why it cannot be pressed now, as the page says to who tries; empty where it can.
+    lit : bool or None
+        Whether it is filled; by default as long as it can be pressed.
+    then : Button or None
+        Where the focus goes from here once it was pressed: from an answer to what goes on.
     """
 
     def __init__(
@@ -108,13 +117,14 @@ class Button:
         from psychopy import visual
 
         self.name = name
-        self.enabled = True
-        self.lit = True
+        self.needs = ""
+        self.lit: bool | None = None
+        self.then: Button | None = None
         self._at, self._size = at, size
         self._action = action
         self._color = color
         self._held = False
-        self._looks: tuple[bool, bool, bool] | None = None  # enabled, lit and held when drawn last
+        self._looks: tuple[bool, bool, bool] | None = None  # when drawn last
         self._shape = visual.ShapeStim(
             window, vertices=rounded(size, 0.014), pos=at, units="height", autoLog=False
         )
@@ -128,10 +138,10 @@ class Button:
         return (*self._at, *self._size)
 
     def contains(self, point: Point) -> bool:
-        """Whether the point lies on the enabled button."""
+        """Whether the point lies on the button."""
         across = abs(point[0] - self._at[0]) <= self._size[0] / 2
         upright = abs(point[1] - self._at[1]) <= self._size[1] / 2
-        return self.enabled and across and upright
+        return across and upright
 
     def press(self, point: Point) -> None:
         """Show that the button is held."""
@@ -144,7 +154,7 @@ class Button:
     def release(self, point: Point) -> None:
         """Act if the mouse is still on the button."""
         self._held = False
-        if self.contains(point):
+        if self.contains(point) and not self.needs:
             self._action()
 
     def cancel(self) -> None:
@@ -152,25 +162,25 @@ class Button:
         self._held = False
 
     def key(self, key: KeyPress) -> None:
-        """Act at Enter or Space, while enabled."""
-        if self.enabled and key.name in PRESSING:
+        """Act at Enter or Space."""
+        if key.name in PRESSING and not self.needs:
             self._action()
 
     def draw(self) -> None:
-        """Filled while lit, outlined while not, pale while disabled."""
-        looks = (self.enabled, self.lit, self._held)
+        """Filled while lit, outlined while not, pale while something else is needed first."""
+        filled = not self.needs if self.lit is None else self.lit
+        looks = (filled, filled or not self.needs, self._held)
         if looks != self._looks:  # PsychoPy takes a millisecond to set the colours of a button
             self._looks = looks
-            self._color_parts()
+            self._color_parts(*looks)
         self._shape.draw()
         self._label.draw()
 
-    def _color_parts(self) -> None:
-        lit = self.enabled and self.lit
-        self._shape.fillColor = self._color if lit else CARD
-        self._shape.lineColor = self._color if self.enabled else PALE
-        self._shape.lineWidth = 5 if self._held else 2
-        self._label.color = CARD if lit else (self._color if self.enabled else CONSOLE_GREY)
+    def _color_parts(self, filled: bool, colored: bool, held: bool) -> None:
+        self._shape.fillColor = self._color if filled else CARD
+        self._shape.lineColor = self._color if colored else PALE
+        self._shape.lineWidth = 5 if held else 2
+        self._label.color = CARD if filled else (self._color if colored else CONSOLE_GREY)
 
     def handles(self) -> dict[str, Point]:
         """The button's middle."""
@@ -197,7 +207,7 @@ class RatingScale:
         Called with each rating, 0 … 100.
     """
 
-    enabled = True
+    needs = ""
 
     def __init__(
         self,
@@ -327,12 +337,15 @@ class RatingScale:
 
 
 class FocusRing:
-    """Shows which widget the keys go to, from the first Tab until the mouse is pressed."""
+    """Shows where keys go: until the mouse is pressed, and from the next key on again.
+
+    Who works with the mouse alone sees it on the first page at most.
+    """
 
     def __init__(self, window: Any) -> None:
         from psychopy import visual
 
-        self.visible = False
+        self.visible = True
         self._shape = visual.Rect(
             window,
             units="height",

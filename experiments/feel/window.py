@@ -324,6 +324,7 @@ class FeelWindow:
             button.lit = index == visit.chosen
         self._modes["full"].lit = kind == "full model"
         self._modes["simplified"].lit = kind == "simplified model"
-        self._modes["simplified"].enabled = visit.texture.simplified is not None
+        simplified = visit.texture.simplified
+        self._modes["simplified"].needs = "" if simplified is not None else "a simplified model"
         self._modes["stop"].lit = not visit.playing
         self._modes["noise"].lit = visit.masked

@@ -16,6 +16,9 @@ SHIPPED = ("age", "sex", "handedness")
 # What the console's page has room for: so many buttons, digits of a number to type.
 MOST_LEVELS = 18
 MOST_DIGITS = 6
+# What is stored of who prefers not to answer, which everybody may: no study has to allow it. Of a
+# question with this level it is one of the answers.
+NOT_SAID = "not said"
 # What the table of participants says of them anyway.
 TAKEN = ("participant_id", "code", "slot", "language", "pilot", "simulated", "status")
 
@@ -124,6 +127,11 @@ class Question(FileSection):
     def is_number(self) -> bool:
         """Whether it asks for a number, not for one of several levels."""
         return not self.levels
+
+    @property
+    def has_refusal(self) -> bool:
+        """Whether not to answer is one of its own levels."""
+        return NOT_SAID in self.levels
 
     def require_texts(self, languages: tuple[str, ...]) -> None:
         """Refuse a question of the study's own that lacks its wording in a language.

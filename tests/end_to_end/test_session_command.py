@@ -13,11 +13,24 @@ from typing import Any
 
 import pytest
 
+from tactileq.commands.study.session import models_of_study
+from tactileq.experiments.sessions.kept.files import lock_of
 from tactileq.experiments.sessions.kept.log import read_log
+from tactileq.experiments.sessions.loop.people import SessionAborted
+from tactileq.experiments.sessions.loop.running import run_session
+from tactileq.experiments.sessions.loop.trial_loop import People
+from tactileq.experiments.sessions.store.withdrawing import drop_out
+from tactileq.experiments.study.study import Study
+from tactileq.experiments.tasks import task_named
+from tactileq.modeling.files.locks import Lock
+from tactileq.rig.desk.twin import SimulatedRig
+from tests.experiments.scripted import Ready, Scripted
 from tests.rig.waiting import wait_until
 from tests.two_surfaces import save_two_surfaces
 
 WORDS = ("session", "--task", "absolute", "--study", "study.toml", "--data", "data")
+# In the middle of a screen of 1920 x 1080: the left button of a page, and beside that of others.
+YES = ("760", "732")
 SECONDS = 500.0  # for a hang, not for speed
 
 
@@ -46,20 +59,125 @@ def begin(study: Path, display: str) -> Any:
     return process
 
 
+class Person(Scripted):
+    """Answers by rote, and stops before this trial."""
+
+    simulated = False
+
+    def __init__(self, stops: int | None = None) -> None:
+        super().__init__()
+        self._stops = stops
+
+    def wait(self, until: Callable[[], bool]) -> None:
+        if self.answered == self._stops:
+            raise SessionAborted("tired")
+
+
+@pytest.fixture
+def take_part(study: Path) -> Callable[..., Path]:
+    """Runs a person's session without a window; its log."""
+    plan = Study.load(study / "study.toml")
+    sets, _ = models_of_study(plan, study / "study.toml", models=None, simplified=None, scene=None)
+
+    def session(respondent: Scripted, *, subject: int = 1) -> Path:
+        _, manifest = run_session(
+            task_named("absolute"),
+            plan,
+            subject=subject,
+            session=1,
+            models=sets,
+            rig=SimulatedRig(),
+            people=People(respondent=respondent, experimenter=Ready()),
+            data_folder=study / "data",
+        )
+        return manifest.with_name(manifest.name.replace("manifest.json", "log.jsonl"))
+
+    return session
+
+
+@pytest.fixture
+def refuse(
+    study: Path, main: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., str]:
+    """Asks for a session where neither a display nor PsychoPy can be had; the refusal."""
+    for name in [name for name in sys.modules if name.split(".")[0] == "psychopy"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "psychopy", None)
+    monkeypatch.delenv("DISPLAY", raising=False)
+
+    def session(*words: str) -> str:
+        before = sorted(study.rglob("*"))
+        done = main(*WORDS, *words)
+        assert done.returncode == 1
+        assert done.stderr.startswith("error: expected ")
+        assert done.stderr.count("\n") == 1
+        assert sorted(study.rglob("*")) == before
+        return done.stderr
+
+    return session
+
+
+def test_a_session_that_was_begun_is_refused_before_a_window_is_opened(
+    take_part: Callable[..., Path], refuse: Callable[..., str]
+) -> None:
+    name = "_ses-01_task-absolute"
+    assert f"sub-01{name}_manifest.json" in refuse("--resume")  # there is none yet
+    take_part(Person())
+    for words in ((), ("--resume",)):
+        told = refuse(*words)
+        assert f"sub-01{name}" in told
+        assert "complete" in told
+    log = take_part(Person(stops=1), subject=2)
+    told = refuse("--subject", "2")
+    assert f"sub-02{name}" in told
+    assert "continue with --resume" in told
+    (lock := Lock(lock_of(log))).acquire(1.0)
+    assert "another console" in refuse("--subject", "2", "--resume")
+    lock.release()
+    log.write_bytes(log.read_bytes().replace(b'"utc"', b'"utx"'))
+    for words in ((), ("--resume",)):
+        assert log.name in refuse("--subject", "2", *words)
+
+
+def test_who_cannot_take_part_is_refused_before_a_window_is_opened(
+    study: Path, take_part: Callable[..., Path], refuse: Callable[..., str]
+) -> None:
+    take_part(Person(stops=1))
+    take_part(Person(stops=1), subject=2)
+    assert "subject 3" in refuse("--subject", "3")  # the study has two slots
+    assert "session" in refuse("--session", "2")  # and one session of each
+    assert "pilot" in refuse("--subject", "2", "--resume", "--pilot")
+    drop_out(study / "data", 2)
+    assert "dropped out" in refuse("--subject", "2", "--resume")
+    (study / "study.toml").write_text((study / "study.toml").read_text().replace("= 3", "= 4"))
+    assert "seed" in refuse("--resume")
+
+
+def test_a_session_that_can_begin_is_refused_for_want_of_a_window_alone(
+    take_part: Callable[..., Path], refuse: Callable[..., str]
+) -> None:
+    assert "psychopy" in refuse()
+    take_part(Person(stops=1))
+    assert "psychopy" in refuse("--resume")
+
+
 def log_of(study: Path) -> list[dict[str, Any]]:
     found = list((study / "data/sourcedata").rglob("*_log.jsonl"))
     return [dict(event) for event in read_log(found[0]).events] if found else []
 
 
 def press_until(done: Callable[[], bool], display: str, process: subprocess.Popen[str]) -> None:
-    """Press Tab and Enter now and then, as who goes on to the next page, until it has happened."""
+    """Go on to the next page now and then until it has happened: by Enter, which on the page that
+    asks for the code has no button to press, and by the mouse where that page has its yes."""
 
     def pressed() -> bool:
         if done():
             return True
         assert process.poll() is None, process.communicate()[1]
         subprocess.run(
-            ["xdotool", "key", "Tab", "Return"], env={**os.environ, "DISPLAY": display}, check=True
+            ["xdotool", "mousemove", *YES, "click", "1", "key", "Return"],
+            env={**os.environ, "DISPLAY": display},
+            check=True,
         )
         time.sleep(0.1)
         return False

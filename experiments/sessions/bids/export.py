@@ -217,16 +217,18 @@ def _people_after(root: Path, own: StoredSession) -> Made:
     """The tables about people after a session, of which only those of its participant change.
 
     The others' rows stay as they are, so that this takes no longer the more sessions there are;
-    all are made where somebody has none yet, or columns change.
+    all are made where somebody has none yet, columns change, or their description does not follow
+    from these sessions alone: somebody else left a question unanswered.
     """
     table, name = root / "participants.tsv", own.files.participant
+    described = table.with_suffix(".json")
     everybody = sessions_in(root)
     shown = {files.participant for files in everybody if files.answers.is_file()}
     others = shown - {name}
     if others and (root / DESCRIPTION_NAME).is_file() and others <= people_there(table):
         held, damaged = held_of(files for files in everybody if files.participant == name)
         made = _people(root, held, damaged=damaged, others=others)
-        if table in made:
+        if table in made and not _differing({described: made[described]}):
             return made
     held, damaged = held_sessions(root)
     return _people(root, held, damaged=damaged)

@@ -13,6 +13,7 @@ from typing import Any
 
 from tactileq.experiments.sessions.bids.tables import cell, json_bytes, table_bytes
 from tactileq.experiments.sessions.kept.stored_sessions import StoredSession
+from tactileq.experiments.study.questions import NOT_SAID
 from tactileq.modeling.files.answer_tables import ANSWER_TABLES, PARTICIPANT_COLUMNS, PARTICIPANT_ID
 from tactileq.modeling.files.columns import Column, sidecar
 
@@ -108,20 +109,45 @@ def _rows_there(table: Path) -> tuple[bytes, dict[str, bytes]]:
 
 def _questions(sessions: Iterable[StoredSession]) -> Iterable[Column]:
     """The columns of what was asked, in the order of the study."""
+    declined = {
+        name for held in sessions for name, said in _answers(held).items() if said == NOT_SAID
+    }
     columns: dict[str, Column] = {}
     for held in sessions:
         for question in held.manifest.study.get("questions", ()):
-            name, levels = question["name"], question.get("levels", ())
-            english = question.get("levels_text", {}).get("en", levels)
-            column = Column(
-                name,
-                unit="year" if name == "age" else "",
-                description=question.get("text", {}).get("en", name.replace("_", " ")),
-                # As they stand in cells: validators compare these with them, quotes and all.
-                levels=dict(zip(map(cell, levels), english, strict=True)) if levels else {},
-            )
-            columns.setdefault(name, column)
+            name = question["name"]
+            columns.setdefault(name, _question(question, declined=name in declined))
     return columns.values()
+
+
+def _question(question: Mapping[str, Any], *, declined: bool) -> Column:
+    """The column of a question; that somebody left it unanswered is described where it happened.
+
+    A choice has a level for that. A number, of which a column holds nothing else, is n/a then.
+    """
+    name, levels = question["name"], question.get("levels", ())
+    english = question.get("levels_text", {}).get("en", levels)
+    description = question.get("text", {}).get("en", name.replace("_", " "))
+    if declined and not levels:
+        description += "; n/a of whoever preferred not to say"
+    elif declined and NOT_SAID not in levels:
+        levels, english = [*levels, NOT_SAID], [*english, "preferred not to say"]
+    return Column(
+        name,
+        unit="year" if name == "age" else "",
+        description=description,
+        # As they stand in cells: validators compare these with them, quotes and all.
+        levels=dict(zip(map(cell, levels), english, strict=True)) if levels else {},
+    )
+
+
+def _answers(held: StoredSession) -> dict[str, object]:
+    """What a participant answered to the questions in a session."""
+    answers: dict[str, object] = {}
+    for event in held.state.events:
+        if event["event"] == "welcome":
+            answers |= event.get("answers") or {}
+    return answers
 
 
 def _person(
@@ -131,9 +157,11 @@ def _person(
     answers: dict[str, object] = {}
     consent = ""
     for held in sessions:
+        numbers = {q["name"] for q in held.manifest.study.get("questions", ()) if "least" in q}
+        for question, said in _answers(held).items():
+            answers[question] = None if said == NOT_SAID and question in numbers else said
         for event in held.state.events:
             if event["event"] == "welcome":
-                answers |= event.get("answers") or {}
                 consent = event.get("consent") or consent
     listed = roster.get(first.subject, {})
     return {

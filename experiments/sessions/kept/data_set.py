@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -52,8 +53,21 @@ def claim_data_set(root: Path, manifest: SessionManifest, *, overrides: Override
         try:
             write_new(path, dump_json(describe_data_set(manifest)).encode())
         except FileExistsError:
-            found = read_json_object(path, advice="choose another data folder for these sessions")
-            _check(found, describe_data_set(manifest), path=path, overrides=overrides)
+            require_same_data_set(root, manifest, overrides=overrides)
+
+
+def require_same_data_set(root: Path, manifest: SessionManifest, *, overrides: Overrides) -> None:
+    """Refuse a session that does not belong to the data set that is there, if one is.
+
+    Raises
+    ------
+    InputError
+        As `claim_data_set`.
+    """
+    path = root / DESCRIPTION_NAME
+    if os.path.lexists(path):
+        found = read_json_object(path, advice="choose another data folder for these sessions")
+        _check(found, describe_data_set(manifest), path=path, overrides=overrides)
 
 
 def require_study(root: Path, study: Study) -> None:

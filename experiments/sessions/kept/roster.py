@@ -173,6 +173,22 @@ class Roster:
                     os.truncate(self.path, before)
                 raise
 
+    def slot_for(self, subject: int, participants: int, *, simulated: bool = False) -> int:
+        """The slot with which `enrolling` would take this participant now; nothing is written.
+
+        Raises
+        ------
+        InputError
+            As `enrolling`.
+        """
+        check_whole("subject", subject, low=1, high=9999)
+        listed = self.listed()
+        if subject in listed.entries:
+            _require_own_slot(subject, listed.entries, path=self.path)
+            return self._returning(listed, subject, participants, simulated=simulated).slot
+        self._require_whole(listed)
+        return _slot(subject, participants, listed.entries)
+
     def note_seal(self, sealed: LastSeal) -> None:
         """Note the seal with which a session ended.
 
@@ -412,8 +428,7 @@ def _without_code(line: bytes, subject: int) -> bytes:
 
 def _time_of(event: Mapping[str, Any]) -> str:
     """In UTC, as every line has it; empty where it is none, which nothing else hangs on."""
-    utc = event.get("utc")
-    return utc if is_time(utc) else ""
+    return str(event["utc"]) if is_time(event.get("utc")) else ""
 
 
 def _last(listed: Listed) -> LastSeal | None:

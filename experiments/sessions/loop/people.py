@@ -69,6 +69,11 @@ class RatedTrial(Protocol):
     def trial(self) -> int: ...
 
     @property
+    def phase(self) -> str:
+        """Either "main", or "training", whose pages are marked."""
+        ...
+
+    @property
     def texture(self) -> str: ...
 
     @property
@@ -85,6 +90,11 @@ class ChoiceTrial(Protocol):
 
     @property
     def trial(self) -> int: ...
+
+    @property
+    def phase(self) -> str:
+        """Either "main", or "training", whose pages are marked."""
+        ...
 
     @property
     def texture(self) -> str: ...

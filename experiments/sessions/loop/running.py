@@ -26,7 +26,7 @@ from tactileq.experiments.sessions.loop.task import Task
 from tactileq.experiments.sessions.loop.trial_loop import People, SessionResult, run_trials
 from tactileq.experiments.sessions.store.admission import check_clock
 from tactileq.experiments.sessions.store.exposure import exposed_g2_s
-from tactileq.experiments.sessions.store.session_store import SessionStore
+from tactileq.experiments.sessions.store.session_store import SessionStore, require_openable
 from tactileq.experiments.study.design import SessionPlan
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.study import Study, plan_sha256
@@ -121,22 +121,19 @@ def run_session(
         If the disk does not take the answers.
     """
     said = circumstances or Circumstances()
-    said = replace(said, language=study.language_of_session(said.language))
-    _require_texts(study, said.texts)
     overrides = Overrides(said.override, tell=said.tell)
-    models.require(study, allow=overrides.allow)
+    said = _prepared(study, models, rig, said=said, overrides=overrides)
     root = Path(data_folder)
     check_clock(root, tell=said.tell or _untold)
-    for stimulus in models.stimuli:
-        rig.check_stimulus(stimulus)
     rig.open()
     try:
         # Asks git, hashes models: nobody else can enroll while the roster is locked.
-        stated = _stated(study, task, models=models, rig=rig, people=people, said=said)
+        simulated = people.respondent.simulated
+        stated = _stated(study, task, models=models, rig=rig, simulated=simulated, said=said)
         enrolling = Roster(root).enrolling(
             subject,
             study.plan_of(task.name).participants,
-            simulated=people.respondent.simulated,
+            simulated=simulated,
             pilot=said.pilot,
         )
         _require_consent(
@@ -160,7 +157,7 @@ def run_session(
             opened = SessionStore.resume if said.resume else SessionStore.create
             store = opened(root, manifest, overrides=overrides, texts=said.texts)
         with _sealed(store, root):
-            stored = _stored_plan(plan, task, store=store, models=models)
+            stored = _stored_plan(plan, task, stored=store.manifest, models=models)
             result = run_trials(
                 stored,
                 task,
@@ -176,6 +173,70 @@ def run_session(
     finally:
         rig.close()
     return replace(result, seal=store.seal), store.files.manifest
+
+
+def require_ready(
+    task: Task,
+    study: Study,
+    *,
+    subject: int,
+    session: int,
+    models: ModelSets,
+    rig: TextureRig,
+    simulated: bool,
+    data_folder: str | Path,
+    circumstances: Circumstances | None = None,
+) -> None:
+    """Refuse a session that `run_session` would, as far as that needs neither rig nor respondent.
+
+    It is asked before a window is opened. Nothing is written, and `run_session` asks it all again:
+    another console may have begun the session meanwhile.
+
+    Parameters
+    ----------
+    simulated : bool
+        Whether a program will answer.
+
+    Raises
+    ------
+    InputError
+        As `run_session`.
+    """
+    said = circumstances or Circumstances()
+    overrides = Overrides(said.override)  # which are told when the session begins
+    said = _prepared(study, models, rig, said=said, overrides=overrides)
+    check_clock(Path(data_folder), tell=_untold)  # it is told of when the session begins
+    slot = Roster(data_folder).slot_for(
+        subject, study.plan_of(task.name).participants, simulated=simulated
+    )
+    plan = draw_session(study, task, subject=subject, session=session, slot=slot)
+    manifest = SessionManifest(
+        **_stated(study, task, models=models, rig=rig, simulated=simulated, said=said),
+        subject=subject,
+        session=session,
+        slot=slot,
+        code="",
+        trials=tuple(trial.to_dict() for trial in plan.trials),
+    )
+    in_force = require_openable(data_folder, manifest, overrides=overrides, resume=said.resume)
+    _stored_plan(plan, task, stored=in_force, models=models)
+
+
+def _prepared(
+    study: Study,
+    models: ModelSets,
+    rig: TextureRig,
+    *,
+    said: Circumstances,
+    overrides: Overrides,
+) -> Circumstances:
+    """The circumstances with their language; refuses what could not be presented or read."""
+    said = replace(said, language=study.language_of_session(said.language))
+    _require_texts(study, said.texts)
+    models.require(study, allow=overrides.allow)
+    for stimulus in models.stimuli:
+        rig.check_stimulus(stimulus)
+    return said
 
 
 @contextmanager
@@ -200,7 +261,7 @@ def _stated(
     *,
     models: ModelSets,
     rig: TextureRig,
-    people: People,
+    simulated: bool,
     said: Circumstances,
 ) -> dict[str, Any]:
     """The part of a manifest that does not depend on the participant."""
@@ -210,7 +271,7 @@ def _stated(
         "language": said.language,
         "texts_sha256": sha256_of_texts(said.texts) or None,
         "pilot": said.pilot,
-        "simulated_participant": people.respondent.simulated,
+        "simulated_participant": simulated,
         "simulated_rig": rig.simulated,
         "study": study.to_dict(),
         "study_sha256": study.sha256,
@@ -299,19 +360,19 @@ def _welcomes(log: Path, consent: str) -> bool:
 
 
 def _stored_plan(
-    plan: SessionPlan, task: Task, *, store: SessionStore, models: ModelSets
+    plan: SessionPlan, task: Task, *, stored: SessionManifest, models: ModelSets
 ) -> SessionPlan:
-    """The plan that the manifest on disk holds, whatever the study file says by now.
+    """The plan that the stored manifest holds, whatever the study file says by now.
 
     Raises
     ------
     InputError
         If there is no model any more for what it plans.
     """
-    study = Study.from_dict(store.manifest.study)
+    study = Study.from_dict(stored.study)
     if study.sha256 != plan.study.sha256:
         models.require(study, allow=lambda what, sentence: None)
-    trials = tuple(task.trial_of(values) for values in store.manifest.trials)
+    trials = tuple(task.trial_of(values) for values in stored.trials)
     return replace(plan, study=study, trials=trials)
 
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 from datetime import date, datetime, timedelta
 from pathlib import Path
 
-from tactileq.experiments.sessions.kept.data_set import claim_data_set
+from tactileq.experiments.sessions.kept.data_set import claim_data_set, require_same_data_set
 from tactileq.experiments.sessions.kept.files import SessionFiles
 from tactileq.experiments.sessions.kept.log import YEARS, now_utc, utc_text
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
@@ -73,10 +73,18 @@ def admit(files: SessionFiles, manifest: SessionManifest, *, overrides: Override
     OSError
         If the disk does not take the description of the data set.
     """
+    require_admissible(files, manifest, overrides=overrides)
+    claim_data_set(files.root, manifest, overrides=overrides)
+
+
+def require_admissible(
+    files: SessionFiles, manifest: SessionManifest, *, overrides: Overrides
+) -> None:
+    """Refuse as `admit` does; nothing is written."""
     refuse_begun(files)
     if manifest.session > 1:
         _require_day_before(files, manifest, overrides=overrides)
-    claim_data_set(files.root, manifest, overrides=overrides)
+    require_same_data_set(files.root, manifest, overrides=overrides)
 
 
 def refuse_begun(files: SessionFiles) -> None:

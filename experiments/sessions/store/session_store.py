@@ -34,7 +34,7 @@ from tactileq.experiments.sessions.kept.log import (
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
 from tactileq.experiments.sessions.kept.overrides import Overrides
 from tactileq.experiments.sessions.kept.state import SessionState, state_of
-from tactileq.experiments.sessions.kept.stored_sessions import check_named, wrong_in
+from tactileq.experiments.sessions.kept.stored_sessions import check_named, held_session, wrong_in
 from tactileq.experiments.sessions.kept.tables import GrowingTable
 from tactileq.experiments.sessions.kept.texts import TextsByLanguage, write_texts
 from tactileq.experiments.sessions.kept.traces import (
@@ -46,7 +46,7 @@ from tactileq.experiments.sessions.kept.traces import (
     presentation_table,
 )
 from tactileq.experiments.sessions.kept.writer import LogWriter, StoreError, store_error
-from tactileq.experiments.sessions.store.admission import admit, refuse_begun
+from tactileq.experiments.sessions.store.admission import admit, refuse_begun, require_admissible
 from tactileq.modeling import InputError
 from tactileq.modeling.errors import shown
 from tactileq.modeling.files.columns import Column, sidecar
@@ -199,12 +199,7 @@ class SessionStore:
         """
         overrides = overrides or Overrides()
         files = manifest.files(data_folder)
-        if not files.manifest.exists():
-            raise InputError(
-                f"expected a session that was begun, got no {files.manifest}; leave out --resume."
-            )
-        stored = SessionManifest.load(files.manifest)
-        _check_unchanged(stored, manifest, files=files, overrides=overrides)
+        stored = _begun_manifest(files, manifest, overrides=overrides)
         try:
             with _claimed(files) as lock:
                 # Killed between manifest and log, it has none yet.
@@ -359,6 +354,49 @@ def _remove(files: SessionFiles) -> None:
     for path in sorted(files.there(), key=files.manifest.__eq__):
         with suppress(OSError):
             path.unlink()
+
+
+def require_openable(
+    data_folder: str | Path, manifest: SessionManifest, *, overrides: Overrides, resume: bool
+) -> SessionManifest:
+    """Refuse a session as `SessionStore.create`, or with `resume` as `SessionStore.resume`, would.
+
+    Nothing is written, so that it can be asked before anybody sits down; only opening it keeps
+    others from beginning the same session.
+
+    Returns
+    -------
+    SessionManifest
+        The one that would be in force.
+
+    Raises
+    ------
+    InputError
+        Also where what is to be resumed cannot be read to its end.
+    """
+    files = manifest.files(data_folder)
+    if not resume:
+        require_admissible(files, manifest, overrides=overrides)
+        return manifest
+    stored = _begun_manifest(files, manifest, overrides=overrides)
+    held = held_session(files)
+    with _claimed(files) as lock:
+        lock.release()  # nobody runs it
+    _check_open(held.state, stored, files=files)
+    return stored
+
+
+def _begun_manifest(
+    files: SessionFiles, manifest: SessionManifest, *, overrides: Overrides
+) -> SessionManifest:
+    """The manifest of a session that was begun, which another one must not contradict."""
+    if not files.manifest.exists():
+        raise InputError(
+            f"expected a session that was begun, got no {files.manifest}; leave out --resume."
+        )
+    stored = SessionManifest.load(files.manifest)
+    _check_unchanged(stored, manifest, files=files, overrides=overrides)
+    return stored
 
 
 @contextmanager

@@ -159,12 +159,12 @@ def _person(
         left=entry["left"],
         sessions=tuple(map(_session, found)),
     )
-    begun = {
+    active = {
         (one.files.task, one.files.session): one.state.last_utc
         for one in found
         if isinstance(one, StoredSession)
     }
-    return person if person.left else replace(person, due=_due(person, begun, wanted, today=today))
+    return person if person.left else replace(person, due=_due(person, active, wanted, today=today))
 
 
 def _session(one: StoredSession | Damaged) -> SessionProgress:
@@ -184,27 +184,55 @@ def _session(one: StoredSession | Damaged) -> SessionProgress:
 
 def _due(
     person: PersonProgress,
-    begun: Mapping[tuple[str, int], str],
+    active: Mapping[tuple[str, int], str],
     wanted: Mapping[str, tuple[int, int]],
     *,
     today: date | None,
 ) -> str:
-    """The first session of the study that is not complete."""
-    status = {(one.task, one.session): one.status for one in person.sessions}
-    for task, (participants, sessions) in wanted.items():
-        if person.slot > participants:
-            continue
-        for session in range(1, sessions + 1):
-            name = f"{task} {session}" if sessions > 1 else task
-            stands = status.get((task, session))
-            if stands in ("running", "damaged"):
-                return f"{name} is {stands}"
-            if stands in ("aborted", "crashed"):
-                return f"{name}, with --resume"
-            if stands is None:
-                day_before = begun.get((task, session - 1), "")
-                return f"{name}, not before tomorrow" if _is(day_before, today) else name
-    return ""
+    """The next session, in words; `active` has when each was active last."""
+    stands: dict[tuple[str, int], str] = {(s.task, s.session): s.status for s in person.sessions}
+    planned = [
+        [(task, session) for session in range(1, sessions + 1)]
+        for task, (participants, sessions) in wanted.items()
+        if person.slot <= participants
+    ]
+    in_order = _in_order(planned, stands, active)
+    if not in_order:
+        return ""
+    task, session = in_order[0]
+    name = f"{task} {session}" if wanted[task][1] > 1 else task
+    day_before = _is(active.get((task, session - 1), ""), today)
+    return name + _words(stands.get((task, session)), day_before=day_before)
+
+
+def _in_order(
+    planned: Sequence[Sequence[tuple[str, int]]],
+    stands: Mapping[tuple[str, int], str],
+    active: Mapping[tuple[str, int], str],
+) -> list[tuple[str, int]]:
+    """Planned sessions (task by task) that are not complete, the one that is due next first.
+
+    What was begun comes before what was not. The one that runs now is first; then those that were
+    interrupted, the one that was active last before others, since after a short gap training is not
+    repeated; then those that are damaged, which somebody has to restore. Of those never begun, the
+    ones of a task that was begun come before the other ones, else as in the study.
+    """
+    every = [one for of_task in planned for one in of_task]
+    interrupted = [one for one in every if stands.get(one) in ("aborted", "crashed")]
+    begun_tasks_first = sorted(planned, key=lambda of_task: stands.keys().isdisjoint(of_task))
+    return [
+        *(one for one in every if stands.get(one) == "running"),
+        *sorted(interrupted, key=lambda one: active.get(one, ""), reverse=True),
+        *(one for one in every if stands.get(one) == "damaged"),
+        *(one for of_task in begun_tasks_first for one in of_task if one not in stands),
+    ]
+
+
+def _words(status: str | None, *, day_before: bool) -> str:
+    """What is to be known of the session that is due; None of one that was never begun."""
+    if status is None:
+        return ", not before tomorrow" if day_before else ""
+    return ", with --resume" if status in ("aborted", "crashed") else f" is {status}"
 
 
 def _is(utc: str, today: date | None) -> bool:

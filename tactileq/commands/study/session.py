@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -77,7 +77,11 @@ def session(
     from tactileq.experiments.sessions.kept.log import SEAL_WRITTEN
     from tactileq.experiments.sessions.kept.overrides import Overrides
     from tactileq.experiments.sessions.loop.people import ConsentRefused
-    from tactileq.experiments.sessions.loop.running import Circumstances, run_session
+    from tactileq.experiments.sessions.loop.running import (
+        Circumstances,
+        require_ready,
+        run_session,
+    )
     from tactileq.experiments.sessions.loop.trial_loop import People
     from tactileq.experiments.study.study import Study
     from tactileq.experiments.tasks import task_named
@@ -102,6 +106,16 @@ def session(
     if selftest:
         print_timings(sets, device, plan=plan, data=data, fullscreen=fullscreen, screen=screen)
         return
+    asked: dict[str, Any] = {
+        "subject": subject,
+        "session": number,
+        "models": sets,
+        "rig": device,
+        "data_folder": data,
+        "circumstances": circumstances,
+    }
+    # Before the window: nobody is to sit down at a session that cannot begin.
+    require_ready(task_named(task), plan, simulated=False, **asked)
     stamp = ", ".join(["pilot"] * pilot + ["simulated rig"] * device.simulated)
     if device.simulated:
         print("note: the rig is simulated; its data are marked as simulated.")
@@ -111,13 +125,8 @@ def session(
             result, manifest = run_session(
                 task_named(task),
                 plan,
-                subject=subject,
-                session=number,
-                models=sets,
-                rig=device,
                 people=People(respondent=console, experimenter=Terminal()),
-                data_folder=data,
-                circumstances=circumstances,
+                **asked,
             )
         except ConsentRefused:
             print("consent refused: nobody was enrolled, the slot is free; only the count is kept.")

@@ -4,13 +4,15 @@
 
 Standard output: one JSON object per page, {"screen": "en:1024x768", "page": …,
 "texts": [[words, box]], "shapes": [box], "fills": [color] of the shapes, "places": [[x, y]] of the
-texts}; boxes are (left, bottom, right, top), all in pixels from the window's middle. Each page is
+texts, "colors": [[color, that of what is behind it]] of the texts}; boxes are (left, bottom, right,
+top), all in pixels from the window's middle. Each page is
 kept in the folder as a picture; for the folder "-", none is.
 """
 
 import json
 import sys
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 from psychopy import visual
@@ -19,7 +21,7 @@ from pyglet.window import key
 
 from tactileq.experiments.console import page_runner
 from tactileq.experiments.console.console import Console
-from tactileq.experiments.console.drawing import HALF_RISE
+from tactileq.experiments.console.drawing import HALF_RISE, PAPER
 from tactileq.experiments.console.languages import Texts
 from tactileq.experiments.sessions.loop.people import Intake, SessionAborted
 from tactileq.experiments.sessions.loop.surfaces import Surfaces
@@ -64,6 +66,22 @@ def shape_box(stimulus):
     return [float(v) for v in (*corners.min(axis=0), *corners.max(axis=0))]
 
 
+def hex_of(color):
+    return "#" + color.hex.strip("#").upper()
+
+
+def behind(stimulus):
+    """The colour on which a text stands: that of the shape around it that was drawn last."""
+    left, bottom, right, top = text_box(stimulus)
+    color = PAPER
+    for shape in drawn[: drawn.index(stimulus)]:
+        if isinstance(shape, visual.shape.BaseShapeStim) and shape.fillColor is not None:
+            box = shape_box(shape)
+            if box[0] <= left and box[1] <= bottom and right <= box[2] and top <= box[3]:
+                color = hex_of(shape._fillColor)
+    return color
+
+
 class Visitor:
     """Presses and looks, as the steps for a page say: one step a frame."""
 
@@ -99,7 +117,12 @@ class Visitor:
         ]
         told = {"screen": self.screen, "page": name, "texts": texts, "places": places}
         told["shapes"] = [shape_box(s) for s in shapes]
-        told["fills"] = ["#" + s._fillColor.hex.strip("#").upper() for s in shapes]
+        told["fills"] = [hex_of(s._fillColor) for s in shapes]
+        told["colors"] = [
+            [hex_of(s._foreColor), behind(s)]
+            for s in drawn
+            if isinstance(s, visual.TextStim) and s.text
+        ]
         print(json.dumps(told), flush=True)
         if self.folder is not None:
             self.window.getMovieFrame(buffer="back")
@@ -157,11 +180,14 @@ def ask_everything(console, visitor):
         "code": ["look code", "press continue"],
         "known": ["look known", "press yes"],
         "question age": [
-            *("press digit 2", "press digit 5", "look question-age", "press digit 9"),
-            *("look question-age-outside", "press delete", "press continue"),
+            *("press digit 1", "press digit 7", "look question-age-below", "press delete"),
+            *("press decline", "look question-age-declined", "press digit 2", "press digit 5"),
+            *("look question-age", "press digit 9", "look question-age-above", "press delete"),
+            "press continue",
         ],
         **{
             f"question {question.name}": [
+                *("key ENTER", f"look question-{question.name}-needed"),
                 f"press level {question.levels[1]}",
                 f"look question-{question.name}",
                 "press continue",
@@ -192,15 +218,22 @@ def try_everything(console, visitor):
     console.progress(12, 28)
     visitor.plan = {
         "rate": [
-            *("look rate", "key TAB", "key TAB", "look rate-focus", "press virtual"),
-            *("press magnitude:50", "press frequency:100", "key TAB", "look rate-done"),
-            "press continue",
+            *("look rate", "key ENTER", "look rate-needed", "key TAB", "look rate-focus"),
+            *("press virtual", "press magnitude:50", "press frequency:100", "key TAB"),
+            *("look rate-done", "press continue"),
         ]
     }
     console.rate(ABSOLUTE, surfaces_of(1))
+    visitor.plan = {"rate": ["look rate-practice", "key ESCAPE"], "stop": ["press stop now"]}
+    with suppress(SessionAborted):
+        console.rate(replace(ABSOLUTE, phase="training"), surfaces_of(1))
+    visitor.plan["choose"] = ["look choose-7-practice", "key ESCAPE"]
+    with suppress(SessionAborted):
+        console.choose(replace(RELATIVE, phase="training"), surfaces_of(7))
     visitor.plan = {
         "choose": [
-            *("look choose-7", "press button 2", "press answer 2", "press button 5"),
+            *("look choose-7", "press answer 2", "look choose-7-unfelt"),
+            *("press button 2", "press answer 2", "press button 5"),
             *("look choose-7-chosen", "press continue"),
         ]
     }
@@ -225,6 +258,7 @@ def try_everything(console, visitor):
     visitor.plan = {
         "choose": [
             *("look choose-interval", "press button 1", "look choose-interval-first"),
+            *("press button 1", "look choose-interval-again"),
             *("press button 2", "look choose-interval-second", "press answer 1"),
             *("look choose-interval-chosen", "press continue"),
         ]

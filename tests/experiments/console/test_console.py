@@ -119,7 +119,7 @@ def test_a_session_by_mouse_alone(seated: Seated) -> None:
         person.wait_for_page("question age")
         person.click("digit 1")
         person.click("continue")  # 1 is no age that is asked for: no effect
-        for button in ("digit 7", "delete", "digit 9"):
+        for button in ("digit 7", "decline", "digit 1", "digit 9"):
             person.click(button)
         person.click("continue")
         person.wait_for_page("question handedness")
@@ -205,14 +205,17 @@ def test_a_session_by_mouse_alone(seated: Seated) -> None:
 def test_a_session_by_keys_alone(seated: Seated) -> None:
     with seated("en", *ALL_PARTS) as person:
         person.wait_for_page("consent")
-        person.keys("Return")  # nothing has the focus at first: consent is given by no chance
+        person.keys(
+            "Return", "space"
+        )  # nothing has the focus at first: consent is given by no chance
         person.keys("Tab", "Tab", "Tab", "Tab", "shift+Tab", "shift+Tab", "shift+Tab", "space")
         person.wait_for_page("code")
         person.keys("Return")
         person.wait_for_page("question age")
-        person.keys("4", "KP_2", "3", "Return", "BackSpace", "shift+Tab", "shift+Tab", "Return")
+        person.keys("Return", "4", "KP_2", "3", "Return", "BackSpace", "Return")
         person.wait_for_page("question handedness")
-        person.keys("Tab", "Tab", "Tab", "space", "Tab", "Return")
+        # From the first answer to the third; once it is chosen, Enter goes on.
+        person.keys("Tab", "Tab", "space", "Return")
         person.wait_for_page("absolute.training")
         person.keys("Return")
         person.wait_for_page("wait")
@@ -221,16 +224,16 @@ def test_a_session_by_keys_alone(seated: Seated) -> None:
 
         person.wait_for_page("rate")
         assert begins_with_its_page(person, "virtual", "How similar are the two surfaces?")
-        person.keys("Tab", "Return")
+        person.keys("shift+Tab", "shift+Tab", "Return")
         assert person.wait_for("presented") == "real"
         person.keys("v")
         assert person.wait_for("presented") == "virtual"
         person.keys("r")
         assert person.wait_for("presented") == "real"
         # The first key puts the mark to the end that it comes from.
-        person.keys("Tab", "Tab", "Right", "Right", "Up", "shift+Right", "Prior", "Left")
+        person.keys("Tab", "Tab", "Right", "Right", "Up", "shift+Right", "Prior", "Left", "Return")
         person.keys("Tab", "Left", "Left", "Right", "Right", "Next", "Down", "shift+Left")
-        person.keys("Tab", "Return")
+        person.keys("Return")
         person.wait_for_page("rest")
         person.keys("Return")
 
@@ -241,13 +244,13 @@ def test_a_session_by_keys_alone(seated: Seated) -> None:
         assert person.wait_for("presented") == "real"
         person.keys("KP_3")
         assert person.wait_for("presented") == "virtual"
-        # Back over "stop" and "confirm", which is pale as long as nothing is chosen.
-        person.keys("shift+Tab", "shift+Tab", "Return")
+        # From the first number over the others to what can be chosen: 2 and 3 were felt.
+        person.keys("Tab", "Tab", "Tab", "Tab", "Return")
         person.wait_for_note("chosen")
-        person.keys("Tab", "Return")
+        person.keys("Return")
         person.wait_for_page("choose")
-        person.keys("r", "ctrl+3", "Return")  # there is no real one; 3 has not been felt
-        person.keys("3", "ctrl+3", "2", "shift+Tab", "shift+Tab", "Return")
+        person.keys("r", "ctrl+3")  # there is no real one; 3 has not been felt
+        person.keys("3", "ctrl+3", "Return", "2", "ctrl+2", "ctrl+3", "Return")
         person.wait_for_page("absolute.closing")
         person.keys("space")
         result = person.wait_for("result")
@@ -260,6 +263,80 @@ def test_a_session_by_keys_alone(seated: Seated) -> None:
     assert values["magnitude"] == [0, 1, 2, 12, 22, 21]
     assert values["frequency"] == [100, 99, 100, 100, 90, 89, 79]
     assert (magnitude, frequency) == (21, 79)
+
+
+def test_enter_alone_goes_on_where_everything_is_filled_in(seated: Seated) -> None:
+    """By the mouse all is filled in, and by Enter left: it presses what is filled, not the mouse's
+    last button."""
+    with seated("en", "new", "training", "absolute", "rest", "relative", "closing") as person:
+        person.wait_for_page("consent")
+        person.keys("Return")
+        person.click("yes")
+        person.wait_for_page("code")
+        person.keys("Return")
+        person.wait_for_page("question age")
+        for button in ("digit 4", "digit 2"):
+            person.click(button)
+        person.keys("Return")
+        person.wait_for_page("question handedness")
+        person.keys("Return")  # presses the first answer, which is in the frame
+        person.click("level left")
+        person.keys("Return")
+        person.wait_for_page("absolute.training")
+        person.keys("Return")
+        person.wait_for_page("rate")
+        for scale, value in (("magnitude", 20), ("frequency", 60)):
+            person.rate(scale, value)
+            person.wait_for_note("slider")
+        person.click("real")
+        assert person.wait_for("presented") == "real"
+        person.keys("Return")
+        person.wait_for_page("rest")
+        person.keys("Return")
+        person.wait_for_page("choose")
+        person.click("button 3")
+        assert person.wait_for("presented") == "virtual"
+        person.keys("Return")  # nothing is chosen: no effect
+        person.click("answer 3")
+        person.wait_for_note("chosen")
+        person.keys("Return")
+        person.wait_for_page("absolute.closing")
+        person.keys("Return")
+        answers, _, (magnitude, *_), _, related, _ = person.wait_for("result")
+    assert answers == {"age": 42, "handedness": "left"}
+    assert magnitude == pytest.approx(20, abs=0.2)
+    assert related == 2
+    presented = [news["presented"] for news in person.heard if "presented" in news]
+    assert presented == ["virtual", "real", "real", "virtual"]  # Enter repeated none
+
+
+def test_who_prefers_not_to_answer_goes_on_by_mouse_and_by_keys(seated: Seated) -> None:
+    with seated("en", "new") as person:
+        person.wait_for_page("consent")
+        person.click("yes")
+        person.wait_for_page("code")
+        person.click("continue")
+        person.wait_for_page("question age")
+        person.keys("4", "2", "Tab", "Return", "Return")  # what was typed is gone
+        person.wait_for_page("question handedness")
+        person.click("decline")
+        person.click("continue")
+        assert person.wait_for("result") == [{"age": "not said", "handedness": "not said"}]
+
+
+def test_on_the_number_page_the_pad_is_reached_last(seated: Seated) -> None:
+    """Who has but Tab and Enter comes to it, and who types never meets it."""
+    with seated("en", "new") as person:
+        person.wait_for_page("consent")
+        person.keys("Tab", "Return")
+        person.wait_for_page("code")
+        person.keys("Return")
+        person.wait_for_page("question age")
+        # Tab comes to "prefer not to say", 1, 2, 3: the button that goes on is not ready.
+        person.keys("Tab", "Tab", "Tab", "Tab", "Return", "Return", *["shift+Tab"] * 4, "Return")
+        person.wait_for_page("question handedness")
+        person.keys("Return", "Return")
+        assert person.wait_for("result") == [{"age": 33, "handedness": "right"}]
 
 
 def test_stopping_is_asked_again_in_silence(seated: Seated) -> None:

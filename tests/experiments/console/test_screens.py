@@ -24,7 +24,8 @@ ROOT = Path(__file__).parents[3]
 SCRIPT = Path(__file__).with_name("screens_of_all_pages.py")
 SIZES = ((1024, 768), (1920, 1080))
 Box = list[float]
-UNFOCUSED = ("consent", "known", "stop-first", "stop")  # at first, no key but Tab does anything
+UNFOCUSED = ("consent", "known", "stop-first", "stop")  # of which the keys are told at the foot
+READABLE = 4.5  # contrast of text with what is behind it (WCAG 2.2, success criterion 1.4.3)
 
 
 def test_the_only_screen_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -148,6 +149,65 @@ def test_on_no_page_is_anything_cut_or_covered(pages: list[dict[str, Any]]) -> N
         # Between two pixels thin strokes fade.
         off = [abs(value - round(value)) for place in page["places"] for value in place]
         assert max(off) < 1e-6, where
+
+
+def test_every_text_of_every_page_has_the_contrast_that_reading_needs(
+    pages: list[dict[str, Any]],
+) -> None:
+    for page in pages:
+        for (words, _), colors in zip(page["texts"], page["colors"], strict=True):
+            assert contrast(*colors) >= READABLE, (page["screen"], page["page"], words, colors)
+
+
+def test_contrast_is_that_of_the_guidelines() -> None:
+    assert contrast("#000000", "#FFFFFF") == pytest.approx(21.0)
+    assert contrast("#767676", "#FFFFFF") == pytest.approx(4.54, abs=0.005)  # their known example
+    assert contrast("#FFFFFF", "#767676") == contrast("#767676", "#FFFFFF")
+
+
+def contrast(one: str, other: str) -> float:
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def luminance(color: str) -> float:
+    """Relative luminance of an sRGB colour (WCAG 2.2)."""
+    parts = [int(color[at : at + 2], 16) / 255 for at in (1, 3, 5)]
+    linear = [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def test_trials_for_practice_are_marked_and_no_others(pages: list[dict[str, Any]]) -> None:
+    trials = [page for page in pages if page["page"].startswith(("rate", "choose"))]
+    assert {"rate-practice", "choose-7-practice"} <= {page["page"] for page in trials}
+    for page in trials:
+        mark = Texts.load(page["screen"][:2]).of("practice")
+        marked = mark in [words for words, _ in page["texts"]]
+        assert marked is page["page"].endswith("-practice"), page["page"]
+
+
+def test_what_is_refused_is_said_on_the_page(pages: list[dict[str, Any]]) -> None:
+    ages = {"least": 18, "most": 99}
+    keys = {
+        "question-age-below": "question.too_small",
+        "question-age-above": "question.too_large",
+        "question-sex-needed": "question.choose",
+        "rate-needed": "absolute.needed",
+        "choose-7-unfelt": "choice.feel_first",
+        "choose-interval-again": "threshold.felt_now",
+    }
+    said = 0
+    for page in pages:
+        if (key := keys.get(page["page"])) is not None:
+            words = Texts.load(page["screen"][:2]).of(key, number=2, **ages)
+            colors = [
+                color
+                for (shown, _), (color, _) in zip(page["texts"], page["colors"], strict=True)
+                if shown.replace("\n", "") == words
+            ]
+            assert CONSOLE_ORANGE in colors, (page["screen"], page["page"])
+            said += 1
+    assert said == len(keys) * len(WINDOWS)
 
 
 def tells_nothing(texts: list[str]) -> bool:

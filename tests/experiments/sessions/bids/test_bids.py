@@ -496,6 +496,33 @@ def test_levels_are_stored_untranslated_and_described_in_english(write_session) 
     assert described["craft"]["Description"] == "Any craft?"
 
 
+def test_who_left_questions_unanswered_has_a_level_or_no_number_and_the_sidecar_says_so(
+    write_session: Callable[..., SessionFiles],
+) -> None:
+    root = write_session(answers=PERSON).root
+    export_all(root)
+    answered = json.loads((root / "participants.json").read_text(encoding="utf-8"))
+    unsaid = dict.fromkeys(PERSON, "not said")
+    files = write_session(subject=2, answers=unsaid)
+    export_session(root, files.manifest)
+    # Whose session comes later answers all: what is said of the others stays.
+    files = write_session(subject=3, answers=PERSON)
+    export_session(root, files.manifest)
+    assert export_all(root) == Exported()
+    people = pd.read_csv(root / "participants.tsv", sep="\t")
+    assert people["age"].tolist()[0] == 31
+    for number in ("age", "hours_of_sleep"):
+        assert pd.api.types.is_numeric_dtype(people[number])
+        assert people[number].isna().tolist() == [False, True, False]
+    for choice in ("sex", "handedness"):
+        assert people[choice].tolist() == [PERSON[choice], "not said", PERSON[choice]]
+    described = json.loads((root / "participants.json").read_text(encoding="utf-8"))
+    assert described["sex"] == answered["sex"]  # of its own levels one says so
+    assert set(described["handedness"]["Levels"]) == {*answered["handedness"]["Levels"], "not said"}
+    assert "n/a" in described["age"]["Description"]
+    assert "n/a" not in answered["age"]["Description"]  # as before, where everybody answered
+
+
 def test_a_damaged_session_keeps_what_is_shown_of_it_and_costs_nobody_else_anything(
     study_on_disk, write_session
 ):

@@ -39,7 +39,7 @@ def test_sessions_are_told_as_they_stand(write_session):
     )
 
 
-def test_the_next_session_is_the_first_that_is_not_complete(write_session):
+def test_the_next_session_follows_the_order_of_the_study(write_session):
     files = write_session(answered=3, status="aborted")
     root = files.root
     assert due(root) == "absolute, with --resume"
@@ -56,6 +56,64 @@ def test_the_next_session_is_the_first_that_is_not_complete(write_session):
         write_session(task)
     assert due(root) == ""
     assert [task.complete for task in study_progress(root).tasks] == [1, 2, 1, 1]
+
+
+def damage(files):
+    files.log.write_bytes(files.log.read_bytes().replace(b'"utc"', b'"utx"'))
+
+
+# Of one person: what was done, one after another, and what is due then.
+CRASHED, DAMAGED = None, "damaged"
+A, ODD, T = ("absolute", 1), ("oddity", 1), ("threshold", 1)
+R1, R2 = ("relative", 1), ("relative", 2)
+
+
+@pytest.mark.parametrize(
+    ("done", "expected"),
+    [
+        # Interrupted: to be resumed, whatever was never begun before it.
+        ([(R1, "aborted")], "relative 1, with --resume"),
+        ([(R1, CRASHED)], "relative 1, with --resume"),
+        ([(A, "complete"), (ODD, "aborted")], "oddity, with --resume"),
+        ([(R1, "complete"), (R2, "aborted")], "relative 2, with --resume"),
+        ([(T, CRASHED)], "threshold, with --resume"),
+        # Of two, the one that was active last.
+        ([(A, "aborted"), (R1, "aborted")], "relative 1, with --resume"),
+        ([(A, CRASHED), (ODD, CRASHED)], "oddity, with --resume"),
+        ([(ODD, "aborted"), (A, "aborted")], "absolute, with --resume"),
+        ([(A, "aborted"), (R1, "complete")], "absolute, with --resume"),
+        # Damaged: after what can go on, before what was never begun.
+        ([(A, DAMAGED), (R1, "aborted")], "relative 1, with --resume"),
+        ([(A, "aborted"), (R1, DAMAGED)], "absolute, with --resume"),
+        ([(R1, "complete"), (R2, DAMAGED)], "relative 2 is damaged"),
+        ([(A, "complete"), (R1, "complete"), (T, DAMAGED)], "threshold is damaged"),
+        # Never begun: a task that was begun is finished before another.
+        ([(R1, "complete")], "relative 2, not before tomorrow"),
+        ([(ODD, "complete")], "absolute"),
+        ([(ODD, "complete"), (R1, "complete")], "relative 2, not before tomorrow"),
+        ([(A, "complete")], "relative 1"),
+    ],
+)
+def test_what_was_begun_is_due_before_what_was_not(write_session, done, expected):
+    for (task, session), status in done:
+        files = write_session(
+            task,
+            session=session,
+            answered=None if status in ("complete", DAMAGED) else 3,
+            status="complete" if status == DAMAGED else status,
+        )
+        if status == DAMAGED:
+            damage(files)
+    assert due(files.root) == expected
+
+
+def test_what_runs_now_is_told_before_all_else(write_session):
+    root = write_session(answered=3, status="aborted").root
+    files = write_session("threshold", answered=3, status="aborted")
+    with SessionStore.resume(root, SessionManifest.load(files.manifest)) as store:
+        assert due(root) == "threshold is running"
+        store.finish("aborted")
+    assert due(root) == "threshold, with --resume"
 
 
 @pytest.mark.parametrize("ending", ["manifest.json", "log.jsonl"])
