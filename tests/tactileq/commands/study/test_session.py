@@ -45,6 +45,7 @@ def language_of(place: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 
     def run(someone: Scripted, *words: str) -> str:
         opened: list[str] = []
+        someone.simulated = False  # as whoever sits at a console
 
         def open_console(texts: Texts, **of: Any) -> Any:
             opened.append(texts.language)
