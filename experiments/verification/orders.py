@@ -16,8 +16,7 @@ from tactileq.experiments.sessions.loop.order import draw_session
 from tactileq.experiments.sessions.loop.task import Task
 from tactileq.experiments.study.design import Occasion, Order, dealt, fisher_yates
 from tactileq.experiments.study.study import Study
-from tactileq.experiments.tasks.oddity import BUTTONS
-from tactileq.experiments.tasks.threshold import FREQUENCIES_HZ, NONE, PRACTICE_HZ
+from tactileq.experiments.tasks import oddity, threshold
 
 Drafts = list[dict[str, Any]]
 
@@ -50,14 +49,14 @@ def drawn_trials(manifest: SessionManifest, study: Study, task: Task) -> Drafts:
 def _oddity(occasion: Occasion, order: Order) -> Drafts:
     """Before 2026-11-23, 15 h UTC: the odd one's button balanced within texture and model alone."""
     positions = {
-        pair: dealt(range(1, BUTTONS + 1), count, occasion.rng)
+        pair: dealt(range(1, oddity.BUTTONS + 1), count, occasion.rng)
         for pair, count in Counter(order).items()
     }
     drafts = []
     for texture, odd in order:
         position = positions[texture, odd].pop()
         (same,) = set(occasion.models) - {odd}
-        layout = [same] * BUTTONS
+        layout = [same] * oddity.BUTTONS
         layout[position - 1] = odd
         drafts.append(
             {"texture": texture, "model": odd, "layout": tuple(layout), "odd_position": position}
@@ -67,7 +66,9 @@ def _oddity(occasion: Occasion, order: Order) -> Drafts:
 
 def _threshold(occasion: Occasion, order: Order) -> Drafts:
     """Before 2026-11-24, 12 h UTC: one interval once more often at all frequencies."""
-    frequencies_hz = PRACTICE_HZ if occasion.phase == "training" else FREQUENCIES_HZ
+    frequencies_hz = (
+        threshold.PRACTICE_HZ if occasion.phase == "training" else threshold.FREQUENCIES_HZ
+    )
     repeats = occasion.study.plan_of("threshold").repeats
     pair = fisher_yates((1, 2), occasion.rng)
     intervals = {
@@ -76,8 +77,8 @@ def _threshold(occasion: Occasion, order: Order) -> Drafts:
     }
     return [
         {
-            "texture": NONE,
-            "model": NONE,
+            "texture": threshold.NONE,
+            "model": threshold.NONE,
             "frequency_hz": frequency_hz,
             "interval": intervals[frequency_hz][number],
         }
