@@ -28,6 +28,7 @@ from tests.experiments.verification.tampering import (
     SHOWN,
     STORED,
     edit_json,
+    hash_anew,
     lines,
     sha256,
     source,
@@ -98,6 +99,22 @@ def test_what_an_earlier_version_made_is_named_apart_from_differences(root: Path
     assert {Path(place).suffix for place in found.earlier} == {".json", ""}
     assert found.without(["sub-01"]).earlier == ("participants.json", "README")
     assert found.without(["sub-02"]).earlier == found.earlier
+
+
+@pytest.mark.parametrize("version", VERSIONS[:1])
+def test_the_hand_that_is_not_made_again_is_described_anew(root: Path) -> None:
+    """Its table takes longest to make, and is taken as it is there where its sources are."""
+    export_all(root)
+    sidecar = table(root, FIRST, "recording-start1_physio.json")
+    whole = sidecar.read_bytes()
+    words = "What was presented at the last reading"
+    edit_json(sidecar, lambda values: values["surface"].update(Description=words))
+    hash_anew(root, FIRST)
+    found = verify_data(root)
+    assert (found.differences, len(found.earlier)) == ((), 2)
+    export_all(root)
+    assert sidecar.read_bytes() == whole
+    assert verify_data(root).earlier == ()
 
 
 @pytest.mark.parametrize("version", VERSIONS)
