@@ -90,7 +90,7 @@ def _of_answer(
         yield f"expected a planned trial, got {shown(again or row['trial'])}"
         return
     surfaces = _SeenSurfaces(seen)
-    answering = _Recorded(seen, row)
+    answering = _Recorded(seen, row, says_choices=_says_choices(held, event["run"]))
     try:
         trial = task.trial_of({**values, "trial": event["trial"]})
         if task.adapt is not None:
@@ -117,6 +117,15 @@ def _of_answer(
             yield f"expected {name} {shown(expected)}, as the log says, got {shown(got)}"
 
 
+def _says_choices(held: StoredSession, run: int) -> bool:
+    """Whether what was chosen stands in the log of a start of the session.
+
+    It does not where an early version ran it, before logs had seals: what was felt last was chosen.
+    """
+    of_run = (event for event in held.state.events if event["run"] == run)
+    return held.manifest.after is not None or any(e["event"] == "chosen" for e in of_run)
+
+
 def _times(
     held: StoredSession, row: Mapping[str, Any], event: Event, seen: Sequence[Event]
 ) -> Iterator[str]:
@@ -139,8 +148,10 @@ def _same(expected: object, got: object) -> bool:
 class _Recorded:
     """Answers a trial as somebody did, according to the log."""
 
-    def __init__(self, seen: Sequence[Event], row: Mapping[str, Any]) -> None:
-        self._seen, self._row = seen, row
+    def __init__(
+        self, seen: Sequence[Event], row: Mapping[str, Any], *, says_choices: bool
+    ) -> None:
+        self._seen, self._row, self._says_choices = seen, row, says_choices
 
     def rate(self, trial: Trial, surfaces: Surfaces) -> Rating:
         """Where the sliders were released last."""
@@ -158,9 +169,19 @@ class _Recorded:
     def choose(self, trial: Trial, surfaces: Surfaces) -> Choice:
         """What was chosen last."""
         chosen = [e["index"] for e in self._seen if e["event"] == "chosen"]
+        if not self._says_choices:
+            chosen = self._felt(surfaces)
         if not chosen:
             raise ValueError("nothing that was chosen")
         return Choice(button=chosen[-1], response_time_s=self._row["response_time_s"])
+
+    def _felt(self, surfaces: Surfaces) -> list[int]:
+        """The surface felt last; of two intervals, which are felt once, also the one answered."""
+        felt = [] if surfaces.last is None else [surfaces.last]
+        answered = self._row.get("answer")
+        if "interval" in self._row and isinstance(answered, int) and answered - 1 in surfaces.felt:
+            felt.append(answered - 1)
+        return felt
 
 
 class _Limit:

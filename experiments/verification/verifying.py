@@ -19,16 +19,15 @@ from tactileq.experiments.sessions.kept.data_set import (
     is_other,
 )
 from tactileq.experiments.sessions.kept.files import SessionFiles, require_data_folder, sessions_in
-from tactileq.experiments.sessions.kept.log import plain
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
 from tactileq.experiments.sessions.kept.roster import Roster
 from tactileq.experiments.sessions.kept.stored_sessions import Damaged, StoredSession, held_sessions
 from tactileq.experiments.sessions.kept.texts import texts_of_sessions
-from tactileq.experiments.sessions.loop.order import draw_session
 from tactileq.experiments.study.study import Study, plan_sha256
 from tactileq.experiments.tasks import task_named
 from tactileq.experiments.verification.copies import copied
 from tactileq.experiments.verification.difference import Difference
+from tactileq.experiments.verification.orders import drawn_trials
 from tactileq.experiments.verification.replaying import contradictions
 from tactileq.experiments.verification.sidecars import check_sidecars
 from tactileq.modeling import InputError
@@ -70,6 +69,8 @@ class Verified:
         Whether there are logs; without, only hashes in sidecars could be compared.
     manifests : tuple of SessionManifest
         Of all sessions that can be read.
+    earlier : tuple of str
+        Tables, sidecars and README that an earlier version made, with the values of the logs.
     """
 
     differences: tuple[Difference, ...]
@@ -79,12 +80,14 @@ class Verified:
     seal: str = ""
     with_source: bool = True
     manifests: tuple[SessionManifest, ...] = ()
+    earlier: tuple[str, ...] = ()
 
     def without(self, participants: Collection[str]) -> Verified:
         """Without what is about these participants (sub-01) alone."""
         kept = tuple(f for f in self.differences if f.participant not in participants)
         sessions = tuple(s for s in self.sessions if s.partition("_")[0] not in participants)
-        return replace(self, differences=kept, sessions=sessions)
+        earlier = tuple(p for p in self.earlier if p.partition("/")[0] not in participants)
+        return replace(self, differences=kept, sessions=sessions, earlier=earlier)
 
     @property
     def summary(self) -> str:
@@ -98,6 +101,8 @@ class Verified:
             said += f", seal {self.seal}"
         if self.unsealed:
             said += f", {len(self.unsealed)} without seals (of an earlier version)"
+        if self.earlier:
+            said += f", {counted(len(self.earlier), 'file')} made by an earlier version"
         if self.running:
             said += f", {len(self.running)} still running"
         if self.differences:
@@ -132,7 +137,8 @@ def verify_data(data_folder: str | Path) -> Verified:
     ]
     for one in ended:
         found += _of_session(root, one)
-    found += _tables(root, held, damaged)
+    differing, earlier = differing_tables(root, held, damaged)
+    found += _tables(root, differing)
     found += _strangers(root, held, damaged)
     found += _people(root, held)
     found += _description(root, held)
@@ -151,6 +157,7 @@ def verify_data(data_folder: str | Path) -> Verified:
         unsealed=tuple(stem for stem, seal in seals.items() if not seal),
         seal=seal_over(sealed) if sealed else "",
         manifests=tuple(one.manifest for one in held),
+        earlier=tuple(path.relative_to(root).as_posix() for path in earlier),
     )
 
 
@@ -184,13 +191,10 @@ def _of_session(root: Path, one: StoredSession) -> Iterator[Difference]:
     try:
         study, task = Study.from_dict(one.manifest.study), task_named(one.manifest.task)
         facts = one.manifest
-        plan = draw_session(
-            study, task, subject=facts.subject, session=facts.session, slot=facts.slot
-        )
+        drawn = drawn_trials(facts, study, task)
     except InputError as error:
         yield differs(manifest, f"expected a study by which its order can be drawn, got {error}")
         return
-    drawn = [plain(trial.to_dict()) for trial in plan.trials]
     for wanted, got in zip(drawn, facts.trials, strict=False):
         if wanted != got:
             names = [n for n in {**wanted, **got} if wanted.get(n) != got.get(n)]
@@ -248,11 +252,9 @@ def _beside(root: Path, one: StoredSession) -> Iterator[Difference]:
             )
 
 
-def _tables(
-    root: Path, held: Sequence[StoredSession], damaged: Sequence[Damaged]
-) -> Iterator[Difference]:
-    """Every table, made again from the log."""
-    for path in differing_tables(root, held, damaged):
+def _tables(root: Path, differing: Sequence[Path]) -> Iterator[Difference]:
+    """Every table that its log does not give."""
+    for path in differing:
         got = "another" if path.exists() else "none"
         place = path.relative_to(root).as_posix()
         name = place.partition("/")[0]

@@ -99,6 +99,24 @@ def test_what_differs_stops_an_analysis_unless_there_is_a_reason(main, data: Pat
         assert f"NOT VERIFIED: answers differ from what sessions stored ({reason})." in page
 
 
+def test_a_study_of_an_earlier_version_is_verified_and_analyzed(main, tmp_path: Path) -> None:
+    left = Path(__file__).parents[1] / "data" / "earlier_versions"
+    for name in ("models", "simplified"):
+        shutil.copytree(left / name, tmp_path / name)
+    shutil.copytree(left / "e91fb878" / "data", tmp_path / "data")
+    shutil.rmtree(tmp_path / "data/sourcedata/sub-02")  # killed before it had tables
+    done = main("verify", "data")
+    assert (done.returncode, done.stderr.count("\n")) == (0, 1)
+    assert done.stdout.startswith("3 of 3 sessions verified, 3 without seals")
+    assert done.stderr.startswith("note: ")
+    assert "tactileq study status --data data" in done.stderr
+    analyzed = main("analyze", "data", "--complete", "--out", "results")
+    assert (analyzed.returncode, analyzed.stderr) == (0, done.stderr)
+    assert main("study", "status", "--data", "data").returncode == 0
+    renewed = main("verify", "data")
+    assert (renewed.returncode, renewed.stderr) == (0, "")
+
+
 def test_models_are_compared_with_those_that_were_presented(main, tmp_path: Path) -> None:
     models = small_models(TEXTURES)
     sources = {}

@@ -17,7 +17,7 @@ from tactileq.modeling.files.columns import Column, names, without
 # Two records of one presentation: the log's when a press was seen, and the rig's (s).
 SAME_START_S = 1e-3
 
-_MEANINGS = {
+EVENT_MEANINGS = {
     "opened": "The session began or was resumed",
     "welcome": "The participant consented, confirmed the code and answered the questions",
     "phase": "A part of the session was announced",
@@ -167,7 +167,7 @@ def onsets_s(events: Sequence[Event]) -> list[float]:
 def trial_types(rows: Sequence[Mapping[str, object]]) -> dict[str, str]:
     """Every kind of event that there is, with its meaning."""
     found = sorted({str(row["trial_type"]) for row in rows})
-    return {name: _MEANINGS.get(name, "As in the log of the session") for name in found}
+    return {name: EVENT_MEANINGS.get(name, "As in the log of the session") for name in found}
 
 
 def _moment(event: Event) -> datetime:

@@ -10,6 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from tactileq.experiments.sessions.bids.earlier import is_earlier
 from tactileq.experiments.sessions.bids.people import people_files, people_there, readme
 from tactileq.experiments.sessions.bids.session import Made, session_files
 from tactileq.experiments.sessions.bids.tables import json_bytes
@@ -148,7 +149,7 @@ def require_tables(
             advice = otherwise.format(who=one.files.participant)
             raise InputError(f"{one.sentence.removesuffix('.')}, or {advice}.")
     ended = (one for one in held if _to_be_shown(one) and read(one.files))
-    wrong = [path for one in ended for path in _differing(session_files(one)[0])]
+    wrong = [path for one in ended for path in _sorted_out(session_files(one)[0])[0]]
     if wrong:
         others = len(wrong) - 1
         more = f" (and {counted(others, 'more file')})" if others else ""
@@ -162,17 +163,24 @@ def require_tables(
 
 def differing_tables(
     root: Path, held: Sequence[StoredSession], damaged: Sequence[Damaged]
-) -> list[Path]:
-    """Every file that is not there, or is not what all sessions that have ended give, made anew."""
-    made = (session_files(one, anew=True)[0] for one in held if _to_be_shown(one))
-    wrong = [path for of_one in made for path in _differing(of_one)]
+) -> tuple[list[Path], list[Path]]:
+    """Every file that is not what all sessions that have ended give, made anew.
+
+    Returns
+    -------
+    list of Path
+        Those that are not there or hold something else.
+    list of Path
+        Those that an earlier version made of the same sessions.
+    """
+    found = [_sorted_out(session_files(one, anew=True)[0]) for one in held if _to_be_shown(one)]
     if any(one.files.answers.is_file() for one in held):
         # Of who has a session running they are those of before.
         kept = participants_of(one for one in held if one.running)
-        wrong += _differing(_people(root, list(held), damaged=list(damaged), kept=kept))
+        found.append(_sorted_out(_people(root, list(held), damaged=list(damaged), kept=kept)))
         with suppress(InputError):  # a description that cannot be read differs itself
-            wrong += _differing(_readme(root))
-    return wrong
+            found.append(_sorted_out(_readme(root)))
+    return [p for wrong, _ in found for p in wrong], [p for _, earlier in found for p in earlier]
 
 
 def _to_be_shown(held: StoredSession) -> bool:
@@ -263,6 +271,15 @@ def _differing(made: Mapping[Path, bytes]) -> list[Path]:
                 continue
         changed.append(path)
     return changed
+
+
+def _sorted_out(made: Mapping[Path, bytes]) -> tuple[list[Path], list[Path]]:
+    """Of the files that differ those that nobody made so, and those that an earlier version did."""
+    differing: list[Path] = []
+    earlier: list[Path] = []
+    for path in _differing(made):
+        (earlier if is_earlier(path, made[path]) else differing).append(path)
+    return differing, earlier
 
 
 def _write(

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from tactileq.experiments.sessions.bids import events
+from tactileq.experiments.sessions.bids.earlier import has_earlier_text
 from tactileq.experiments.sessions.bids.tables import json_bytes, table_bytes
 from tactileq.experiments.sessions.kept.files import SessionFiles
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
@@ -33,7 +34,7 @@ def session_files(held: StoredSession, *, anew: bool = False) -> tuple[Made, tup
 
     The last file is the sidecar that says that the others are there, and what is not in them. The
     hand at a regular rate takes longest to make: unless all is to be made anew, it is taken as it
-    is there where the sidecar says that it was made from the same files.
+    is there where the sidecar says that it was made from the same files, by this version.
     """
     files = held.files
     runs = {event["run"] for event in held.state.events}
@@ -136,7 +137,10 @@ def _readings(found: TraceRows) -> Any:
 
 
 def _hand_there(sidecar: Path, sources: Mapping[str, str]) -> tuple[Made, tuple[str, ...]] | None:
-    """The hand's files as they were made from the same sources; None where they are not there."""
+    """The hand's files as they were made from the same sources; None where they are not there.
+
+    None, too, where an earlier version described their columns otherwise.
+    """
     try:
         stated = read_json_object(sidecar, advice="")
         names = [name for name in stated["Files"] if "_recording-" in name]
@@ -147,6 +151,8 @@ def _hand_there(sidecar: Path, sources: Mapping[str, str]) -> tuple[Made, tuple[
     except (InputError, OSError, KeyError, AttributeError, TypeError, ValueError):
         return None
     if not as_made or stated.get("DerivedFrom") != sources:
+        return None
+    if any(has_earlier_text(data) for path, data in made.items() if path.suffix == ".json"):
         return None
     return made, tuple(damaged)
 

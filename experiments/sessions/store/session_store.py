@@ -451,7 +451,10 @@ def _check_unchanged(
 
 
 def _changes(stored: SessionManifest, now: SessionManifest) -> dict[str, Any]:
-    """What a manifest would say otherwise today; the order and the reasons are not asked."""
+    """What a manifest would say otherwise today; the order and the reasons are not asked.
+
+    A key that the manifest of an earlier version does not have yet counts as null there.
+    """
     kept = ("trials", "overrides")
     return {
         name: value

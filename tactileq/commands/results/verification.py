@@ -19,6 +19,21 @@ def print_data_differences(found: Verified) -> None:
     print_differences([str(difference) for difference in found.differences])
 
 
+def print_earlier(found: Verified, data: Path) -> None:
+    """A note on files that an earlier version made, on standard error; nothing without any."""
+    from tactileq.modeling.errors import counted
+
+    if found.earlier:
+        first, *others = found.earlier
+        more = f" and {counted(len(others), 'more file')}" if others else ""
+        print(
+            f"note: an earlier version of tactileq made {first}{more}: the values are those of the "
+            "logs, only texts that describe them are other ones; tactileq study status --data "
+            f"{data} makes them again.",
+            file=sys.stderr,
+        )
+
+
 def print_differences(sentences: Sequence[str]) -> None:
     """A line for each, on standard error; of many the first ones."""
     for sentence in sentences[:MOST_SHOWN]:
@@ -51,6 +66,7 @@ def require_verified(
     from tactileq.modeling.errors import counted
 
     found = verify_data(data).without(without)
+    print_earlier(found, data)
     if not found.differences:
         return found
     if unverified is not None:

@@ -28,7 +28,11 @@ def verify(
     Example: tactileq verify data analysis-results
     """
     from tactileq.commands.results.analyze import analyze
-    from tactileq.commands.results.verification import print_data_differences, print_differences
+    from tactileq.commands.results.verification import (
+        print_data_differences,
+        print_differences,
+        print_earlier,
+    )
     from tactileq.commands.results.verified_results import (
         verify_archive,
         verify_models,
@@ -52,6 +56,7 @@ def verify(
         if results is not None:
             checks.append(verify_results(data, results, analyze=analyze))
     print(found.summary)
+    print_earlier(found, data)
     print_data_differences(found)
     for differences, said in checks:
         if said:

@@ -546,7 +546,7 @@ def test_a_damaged_session_keeps_what_is_shown_of_it_and_costs_nobody_else_anyth
 
 
 def differing(root: Path) -> list[Path]:
-    return differing_tables(root, *held_sessions(root))
+    return differing_tables(root, *held_sessions(root))[0]
 
 
 def beh_of(root: Path, participant: str, task: str) -> Path:
