@@ -6,6 +6,7 @@ docs/method/verification.md#earlier-versions
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -14,6 +15,8 @@ from typing import Any
 from tactileq.experiments.sessions.bids.tables import json_bytes
 from tactileq.modeling.files.hashes import sha256_of_file
 
+# A cell that had ' before it, in quotes or not, as in CSV.
+_GUARDED = re.compile(rb"((?:^|\t)\"?)(?='*[=+@])", re.MULTILINE)
 # To each text of this version those that stood in its place before. Whoever changes a text of a
 # sidecar or of the README adds the one that it replaces.
 _TEXTS = Path(__file__).with_name("earlier_texts.json")
@@ -22,8 +25,9 @@ _TEXTS = Path(__file__).with_name("earlier_texts.json")
 def is_earlier(path: Path, made: bytes) -> bool:
     """Whether a file is what an earlier version made where this one makes `made`.
 
-    Only texts that describe may differ, and only those of earlier versions, which are known. A
-    table is never another one: a column that came later is optional, and stored where a row has it.
+    Only texts that describe may differ, and only those of earlier versions, which are known. The
+    cells of a table are the same, but for a ' that stood before what a spreadsheet would calculate:
+    a column that came later is optional, and stored where a row has it.
 
     Parameters
     ----------
@@ -34,6 +38,8 @@ def is_earlier(path: Path, made: bytes) -> bool:
         there = path.read_bytes()
         if path.name == "README":
             return _same(there.decode().split("\n\n"), made.decode().split("\n\n"))
+        if path.suffix == ".tsv":
+            return _GUARDED.sub(rb"\1'", made) == there
         if path.suffix != ".json":
             return False
         values, wanted = json.loads(there), json.loads(made)

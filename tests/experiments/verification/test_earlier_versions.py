@@ -250,3 +250,15 @@ def test_a_choice_is_what_was_felt_last_where_logs_do_not_say_it(root: Path) -> 
     write(source(root, stem, "log.jsonl"), events)
     export_all(root)
     assert any(one.trial for one in verify_data(root).differences)
+
+
+@pytest.mark.parametrize(
+    ("there", "same"),
+    [("'=a\t'+b\tc\n", True), ("'=a\t+b\tc\n", False), ("'=a\t'+b\t'c\n", False)],
+)
+def test_a_cell_that_was_guarded_against_spreadsheets_is_the_same(
+    tmp_path: Path, there: str, *, same: bool
+) -> None:
+    table = tmp_path / "a.tsv"
+    table.write_text(f"x\ty\tz\n{there}")
+    assert is_earlier(table, b"x\ty\tz\n=a\t+b\tc\n") is same
