@@ -43,7 +43,7 @@ __all__ = ["here"]
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 MOST_HIDDEN = 12  # of the calls in a hidden folder
 MOST = 60  # of all calls; only of a whole simulated study there are more
-SAMPLE = 6  # in make test, of each signal
+SAMPLE = 4  # in make test, of each signal
 WRITE_TO = {"wav": "stiff.wav", "json": "stiff.json"}
 # What is already tried by another command of the same kind, but for what it reads.
 _ALIKE = {
@@ -59,7 +59,7 @@ WRITERS: dict[str, tuple[object, ...]] = {
     "study withdraw": ("study", "withdraw", 1, "--data", "taken", "--yes"),
 }
 # In make test: what opens two stores, what is in one file, in several, and in a folder.
-SAMPLED = ("header", "import wav", "study withdraw")
+SAMPLED = ("header", "study withdraw")
 _RANDOM = re.compile(r"\.[0-9a-f]{8}\.unfinished")
 
 
@@ -306,6 +306,12 @@ def go_on_with_the_session() -> int:
     return 0
 
 
+def opening(calls: Sequence[str]) -> int:
+    """The call by which the first line of a session's log is on disk."""
+    name = f"fsync data/{FIRST.log.relative_to('data')}"
+    return calls.index(name) + 1
+
+
 def sweep_session(tmp_path: Path, *, resume: bool, most: int | None = None) -> dict[str, int]:
     before = tmp_path / "before"
     before.mkdir()
@@ -318,7 +324,9 @@ def sweep_session(tmp_path: Path, *, resume: bool, most: int | None = None) -> d
     assert code == 0, told
     tried: dict[str, int] = {}
     for number in SIGNALS:
-        places = list(range(1, len(calls) + 1))
+        # Most of what can go wrong does while it opens.
+        last = len(calls) if most is None else opening(calls)
+        places = list(range(1, last + 1))
         for at in places if most is None else evenly(places, most):
             swept.restore()
             swept.run(at=at, number=number)
