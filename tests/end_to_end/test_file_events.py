@@ -44,7 +44,6 @@ SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 MOST_HIDDEN = 12  # of the calls in a hidden folder
 MOST = 60  # of all calls; only of a whole simulated study there are more
 SAMPLE = 4  # in make test, of each signal
-WRITE_TO = {"wav": "stiff.wav", "json": "stiff.json"}
 # What is already tried by another command of the same kind, but for what it reads.
 _ALIKE = {
     *("a picture of recordings", "scene of a recorded hand", "stimuli of a scene"),
@@ -53,12 +52,13 @@ _ALIKE = {
 }
 WRITERS: dict[str, tuple[object, ...]] = {
     **{name: words for name, words in COMMANDS.items() if name not in _ALIKE},
+    "record": ("record", "new", "--texture", "canvas", "--rate", 5000, "--seed", 1),
     "study init": ("study", "init", "new.toml"),
     "study status": ("study", "status", "--data", "taken"),
     "study dropout": ("study", "dropout", 1, "--data", "taken", "--yes"),
     "study withdraw": ("study", "withdraw", 1, "--data", "taken", "--yes"),
 }
-# In make test: what opens two stores, what is in one file, in several, and in a folder.
+# In make test, beside sessions.
 SAMPLED = ("header", "study withdraw")
 _RANDOM = re.compile(r"\.[0-9a-f]{8}\.unfinished")
 

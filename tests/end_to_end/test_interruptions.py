@@ -1,7 +1,7 @@
-"""Signals at any moment: nothing lost, nothing left, nobody writing on.
+"""Signals while something is computed, by several processes: nothing lost, nobody writing on.
 
-In `make test` a quick command meets two moments, in `make test-long` every command three moments
-of SIGTERM and three of SIGKILL; `TACTILEQ_MOMENTS=10` gives it ten, in half an hour.
+Each command meets three moments of SIGTERM and three of SIGKILL, `TACTILEQ_MOMENTS=10` of them in
+half an hour. Where files are written, `test_file_events.py` ends commands after each call.
 """
 
 from __future__ import annotations
@@ -24,8 +24,6 @@ from tactileq.modeling.perception.verdicts import ENDING
 from tactileq.stimuli.planted.textures import planted_texture, record_texture
 
 MOMENTS = int(os.environ.get("TACTILEQ_MOMENTS", "3"))
-SPEEDS = ("--speed", "100", "--speed", "300", "--force", "1", "--force", "3")
-
 
 Files = dict[str, bytes]
 
@@ -33,11 +31,8 @@ FOLDERS = ("--recordings", "recordings", "--models", "models", "--simplified", "
 # Each writes to `out`; `{}` stands for what differs between an earlier run and the interrupted one:
 # their number, or `{one|other}`.
 LONG = {
-    "import": ("import", "hatt", "{}.xml", *SPEEDS, "--duration", "2"),
     "model": ("model", "recordings", "--jobs", "2", "--layers", "{}"),
     "scene": ("scene", "{light.toml|strong.toml}"),
-    "stimuli": ("stimuli", "models/canvas.json", *SPEEDS, "--seed", "{}"),
-    "record": ("record", "out", "--texture", "canvas", "--rate", "5000", "--seed", "{}"),
     "simulate": ("simulate", "--study", "study.toml", "--data", "out", "--seed", "{}"),
     "power": ("power", "claims.toml", "--subjects", "[8,16]", "--jobs", "2", "--seed", "{}"),
     "analyze": ("analyze", "data", *FOLDERS, "--seed", "{}"),
@@ -45,7 +40,7 @@ LONG = {
     "chart": ("bench", "chart", "--toolkit", "{}.xml", "--method", "AR(6)", "--jobs", "2"),
     "stability": ("stability", "--reduced", "--only", "{blending|vibrators}", "--jobs", "2"),
 }
-NEW_PLACES = ("record", "simulate")  # these refuse what is there
+NEW_PLACES = ("simulate",)  # these refuse what is there
 
 
 def words_of(name: str, which: int) -> list[str]:
@@ -166,9 +161,6 @@ def assert_kept(name: str, found: dict[str, bytes], *, old: Files, new: Files) -
         for file in (file for file in found if file.endswith("_beh.tsv")):
             assert new[file].startswith(found[file])
         return
-    if name == "import" and found["recordings.tsv"] == old["recordings.tsv"]:
-        # New files come first, and belong to the set once the index names them.
-        found = {file: data for file, data in found.items() if file in old}
     if name == "demo":  # all but the answers holds times, which differ from run to run
         found, old, new = (
             {file: data * file.endswith("_beh.tsv") for file, data in files.items()}
@@ -185,18 +177,10 @@ def moments(count: int) -> list[tuple[int, float]]:
     return [(number, share) for number in (signal.SIGTERM, signal.SIGKILL) for share in shares]
 
 
-def test_an_interrupted_command_loses_nothing_and_leaves_nothing(place: Path) -> None:
-    check_interrupted(place, "record", [(signal.SIGTERM, 0.8), (signal.SIGKILL, 0.9)])
-
-
 @pytest.mark.long("interruptions at many moments")
 @pytest.mark.timeout(7200)
 @pytest.mark.parametrize("name", LONG)
 def test_interrupted_at_many_moments(place: Path, name: str) -> None:
-    check_interrupted(place, name, moments(MOMENTS))
-
-
-def check_interrupted(place: Path, name: str, times: list[tuple[int, float]]) -> None:
     out, kept = place / "out", place / "kept"
     kept.mkdir()
     if name == "analyze":
@@ -215,7 +199,7 @@ def check_interrupted(place: Path, name: str, times: list[tuple[int, float]]) ->
     old, new = contents(kept), contents(out)
     assert new != old
     restore()
-    for number, share in times:
+    for number, share in moments(MOMENTS):
         words = words_of(name, 2)
         code, told = interrupt(words, place, number=number, after_s=share * takes_s)
         assert code in (0, -number, 128 + number), told
