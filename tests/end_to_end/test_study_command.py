@@ -151,6 +151,20 @@ def test_the_check_says_what_catch_trials_cost(place: Path, main: Main) -> None:
     assert "catch" not in done.stdout
 
 
+def test_a_tray_that_names_a_texture_is_refused_before_the_study_runs(
+    place: Path, main: Main
+) -> None:
+    file = place / "study.toml"
+    whole = file.read_text(encoding="utf-8")
+    file.write_text(whole.replace('canvas = "B"', 'canvas = "mdf"'), encoding="utf-8")
+    assert Study.load(file).trays["canvas"] == "mdf"  # as what was stored before is still read
+    for words in (["study", "check"], ["study", "plan"], ["session", "--task=absolute", "--study"]):
+        refused = main(*words, "study.toml")
+        assert refused.returncode == 1
+        check_refusal(refused.stderr, names=["'canvas'", "[trays]"], got=["'mdf'", "'MDF'"])
+    assert not (place / "data").exists()
+
+
 def test_the_same_models_twice_are_refused(place: Path, main: Main) -> None:
     text = (place / "study.toml").read_text(encoding="utf-8")
     (place / "study.toml").write_text(

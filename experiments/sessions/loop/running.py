@@ -27,6 +27,7 @@ from tactileq.experiments.sessions.store.session_store import SessionStore
 from tactileq.experiments.study.design import SessionPlan
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.study import Study, plan_sha256
+from tactileq.experiments.study.trays import require_trays
 from tactileq.modeling import InputError
 from tactileq.modeling.errors import shown
 from tactileq.rig.shared.interface import TextureRig
@@ -114,6 +115,7 @@ def run_session(
     said = circumstances or Circumstances()
     overrides = Overrides(said.override, tell=said.tell)
     models.require(study, allow=overrides.allow)
+    require_trays(study, allow=overrides.allow)
     _require_language(study, said.language)
     root = Path(data_folder)
     for stimulus in models.stimuli:

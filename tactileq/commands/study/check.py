@@ -42,10 +42,12 @@ def loaded(path: Path, reads: Callable[..., None] = lambda *paths: None) -> tupl
     from tactileq.experiments.console.languages import require_texts
     from tactileq.experiments.study.models import load_model_sets
     from tactileq.experiments.study.study import Study
+    from tactileq.experiments.study.trays import require_trays
 
     reads(path)
     plan = Study.load(path)
     require_texts(plan)
+    require_trays(plan)
     if any(place.endswith(".toml") for place in plan.models.values()):
         with share_of("Compiling the scene") as advance:
             sets = load_model_sets(plan, path.parent, reads=reads, progress=advance)
