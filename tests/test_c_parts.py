@@ -17,7 +17,7 @@ from tests.sanitizing import ROOT, checked_parts, with_checked_parts
 SERVO = "rig/machines/force/test_processes.py"
 # Part of tools/c_parts.py → tests that drive it, with ordinary and extreme inputs.
 WALKS = {
-    "kernel": ["modeling/rendering/test_kernel.py", "modeling/rendering/test_kernel_properties.py"],
+    "kernel": ["modeling/rendering/test_kernel.py"],
     "kernel_single": ["modeling/rendering/test_kernel_properties.py"],
     "many": ["modeling/rendering/test_many.py"],
     "slopes": ["modeling/estimation/test_compiled.py"],

@@ -21,7 +21,7 @@ from tactileq.modeling.scenes.loading import scene_files, scene_models
 from tactileq.rig.devices.sound.signals import stimuli_of_surfaces
 from tactileq.rig.shared.interface import Presentable, Stimulus
 
-# What may continue where a reason is given: a word for what, and the sentence against it, without its full stop.
+# What may continue where a reason is given: what it is, and the sentence against it, unfinished.
 Allow = Callable[[str, str], None]
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tactileq.commands.study.check import study_check
 from tactileq.experiments.sessions.kept.traces import PRESENTATION_COLUMNS
 from tactileq.experiments.study.study import SHIPPED_STUDY, Study
 from tactileq.modeling import Threshold, simplify
@@ -133,6 +134,23 @@ def test_a_study_is_checked_with_its_models_design_and_balance(place: Path, main
     ):
         assert told in done.stdout
     assert "warning" not in done.stdout
+
+
+def test_what_takes_long_is_said_before_it_begins(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Also in a log, where no bar is seen before its end: sessions and trials to be drawn."""
+    told = []
+
+    def balance(*_: object, **__: object) -> list[object]:
+        told.append(capsys.readouterr().out)
+        return []
+
+    monkeypatch.setattr("tactileq.experiments.tasks.balance.balance_of", balance)
+    study_check(place / "study.toml")
+    # 20 · 16 and 2 · 24 · 21 main trials; each task with its minutes.
+    for fact in ("68 sessions", "1328 main trials", "min per session"):
+        assert fact in told[0]
 
 
 def test_the_check_says_what_catch_trials_cost(place: Path, main: Main) -> None:
