@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from math import inf
 from numbers import Integral, Real
 from typing import TypeGuard
@@ -16,6 +17,8 @@ LARGEST_VALUE = 1e100  # of samples, so that powers of them stay finite
 HIGHEST_SPEED_MM_S = 1e5  # beyond any hand's, as the force
 HIGHEST_FORCE_N = 1e4
 MOST_SAMPLES = 10_000_000  # of one simulated record: 80 MB, and a set may have dozens
+_CLOSE = 0.7  # of difflib's ratio: one letter of four exchanged, or a word that lacks its end
+_MOST_MEANT = 3
 LONGEST_NAME = 100  # of a texture: it is part of file names
 
 
@@ -107,10 +110,17 @@ def check_whole(what: str, value: object, *, low: int, high: int) -> None:
 
 
 def check_keys(values: Iterable[str], known: Sequence[str], *, where: str) -> None:
-    """Refuse keys that are not among the known ones."""
+    """Refuse keys that are not among the known ones, and name those that may be meant."""
     unknown = sorted(set(values) - set(known))
     if unknown:
+        meant = _meant(unknown[:_MOST_MEANT], known)
         raise InputError(
-            f"expected only {', '.join(known)} in {where}, got {shortened(', '.join(unknown))}; "
-            "correct the spelling or remove it."
+            f"expected only {', '.join(known)} in {where}, got {shortened(', '.join(unknown))}"
+            f"{meant and f' (did you mean {meant}?)'}; correct the spelling or remove it."
         )
+
+
+def _meant(unknown: Sequence[str], known: Sequence[str]) -> str:
+    """The names that unknown ones are close to."""
+    close = [get_close_matches(name, known, n=1, cutoff=_CLOSE) for name in unknown]
+    return ", ".join(dict.fromkeys(name for names in close for name in names))

@@ -6,6 +6,7 @@ wrong files. Rules between keys are tested where they stand.
 
 from __future__ import annotations
 
+import copy
 import datetime
 import json
 import re
@@ -408,6 +409,19 @@ def test_a_wrong_key_is_refused_by_name(kind: Kind, place: Place, tmp_path: Path
         sentence = refusal(kind, tmp_path, values, what=what)
         assert re.search(rf"\b{place.key.name}\b", sentence.replace("_misspelt", "")), what
         assert place.where in sentence, (what, sentence)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_a_key_that_lacks_a_letter_is_recognised(kind: Kind, tmp_path: Path) -> None:
+    """Whatever file it is in; not one of three letters or less."""
+    for place in places(kind):
+        name = place.key.name
+        if len(name) >= 4:
+            values = copy.deepcopy(kind.examples[place.example])
+            table = place.table(values)
+            table[name[:1] + name[2:]] = table.pop(name)
+            sentence = refusal(kind, tmp_path, values, what=f"{name} without a letter")
+            assert f"mean {name}?" in sentence
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)

@@ -21,13 +21,13 @@ from tactileq.modeling.scenes.loading import scene_files, scene_models
 from tactileq.rig.devices.sound.signals import stimuli_of_surfaces
 from tactileq.rig.shared.interface import Presentable, Stimulus
 
-# What may continue where a reason is given: a word for what, and the sentence that refuses it.
+# What may continue where a reason is given: what it is, and the sentence against it, unfinished.
 Allow = Callable[[str, str], None]
 
 
 def refuse(what: str, sentence: str) -> NoReturn:
     """Allow no override."""
-    raise InputError(sentence)
+    raise InputError(f"{sentence}.")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,7 +154,7 @@ class ModelSets:
             allow(
                 "exchanged models",
                 "expected models to be made from those of a set that is named before theirs, got "
-                f"the {earlier} model of {texture}, made from the {later} one; swap the two sets.",
+                f"the {earlier} model of {texture}, made from the {later} one; swap the two sets",
             )
 
     def _require_all(self, study: Study) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from tactileq.experiments.study.design import Trial
@@ -33,8 +33,17 @@ class Balance:
     of: int
 
 
-def balance_of(study: Study, task: str) -> list[Balance]:
+def balance_of(
+    study: Study, task: str, *, drawn: Callable[[str], None] = lambda session: None
+) -> list[Balance]:
     """What is balanced in a task when each slot is done once, by the subject of its number.
+
+    Every order is drawn as sessions draw it: some milliseconds each.
+
+    Parameters
+    ----------
+    drawn : callable
+        Called after each session whose order was drawn, with its name.
 
     Raises
     ------
@@ -44,7 +53,7 @@ def balance_of(study: Study, task: str) -> list[Balance]:
     plan = study.plan_of(task)
     sessions = [
         [
-            [trial for trial in _trials(study, task, slot, session) if not _is_apart(trial, task)]
+            _compared(study, task, slot=slot, session=session, drawn=drawn)
             for session in range(1, study.sessions(task) + 1)
         ]
         for slot in range(1, plan.participants + 1)
@@ -69,9 +78,13 @@ def balance_of(study: Study, task: str) -> list[Balance]:
 Found = tuple[str, list[int], int]
 
 
-def _trials(study: Study, task: str, slot: int, session: int) -> list[Trial]:
+def _compared(
+    study: Study, task: str, *, slot: int, session: int, drawn: Callable[[str], None]
+) -> list[Trial]:
+    """The main trials of a session, without those that stand apart."""
     order = plan_session(study, task=task, subject=slot, session=session).trials
-    return [trial for trial in order if trial.phase == "main"]
+    drawn(f"{task} {slot}, {session}")
+    return [trial for trial in order if trial.phase == "main" and not _is_apart(trial, task)]
 
 
 def _is_apart(trial: Trial, task: str) -> bool:

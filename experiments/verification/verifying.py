@@ -13,9 +13,12 @@ from typing import Any
 
 from tactileq.experiments.sessions.bids.export import differing_tables
 from tactileq.experiments.sessions.kept.data_set import (
+    BIDS_VERSIONS,
+    DATASET_TYPE,
     DESCRIPTION_NAME,
     MAY_DIFFER,
     describe_data_set,
+    generated_by,
     is_other,
 )
 from tactileq.experiments.sessions.kept.files import SessionFiles, require_data_folder, sessions_in
@@ -36,7 +39,8 @@ from tactileq.modeling.files.documents import read_json_object
 from tactileq.modeling.files.hashes import seal_over, sha256_of_paths
 
 _OF_A_SESSION = re.compile(r"(sub-\d+)_ses-\d+_task-.*")
-# Of the description: what the first session fixes. The rest is for people to fill in.
+# Of the description: what the first session fixes. `_by_program` looks at what the program writes
+# by itself; the name stands in the README, too; the rest is for people to fill in.
 _FIXED = (
     "Simulated",
     "SimulatedParticipant",
@@ -362,6 +366,7 @@ def _description(root: Path, held: Sequence[StoredSession]) -> Iterator[Differen
     except InputError as error:
         yield Difference(place=DESCRIPTION_NAME, sentence=f"expected a description, got {error}")
         return
+    yield from _by_program(root, found, begun)
     described = [(one, describe_data_set(one.manifest)) for one in begun]
     # That of a session that was deleted with its participant may have been the first.
     if not any(not any(is_other(n, found, made) for n in _FIXED) for _, made in described):
@@ -396,6 +401,34 @@ def _texts(root: Path, held: Sequence[StoredSession]) -> Iterator[Difference]:
                 sentence="expected the texts that sessions name by their hash, got "
                 f"{'others' if found else 'none'}",
             )
+
+
+def _by_program(
+    root: Path, found: Mapping[str, Any], begun: Sequence[StoredSession]
+) -> Iterator[Difference]:
+    """What each version of the program writes into a description by itself."""
+    wanted = {"BIDSVersion": BIDS_VERSIONS, "DatasetType": (DATASET_TYPE,)}
+    differs = [name for name, values in wanted.items() if found.get(name) not in values]
+    if not _is_listed(root, found.get("GeneratedBy"), begun):
+        differs.append("GeneratedBy")
+    for name in differs:
+        yield Difference(
+            place=DESCRIPTION_NAME,
+            sentence=f"expected {name} as a version of tactileq that ran these sessions writes it, "
+            f"got {shown(found.get(name))}",
+        )
+
+
+def _is_listed(root: Path, programs: object, begun: Sequence[StoredSession]) -> bool:
+    """Whether the program that ran a session is among those that a description lists."""
+    listed = (
+        [one for one in programs if isinstance(one, dict)] if isinstance(programs, list) else []
+    )
+    ran = [generated_by(one.manifest) for one in begun]
+    if any(one.get("left") == "withdrawn" for one in Roster(root).listed().entries.values()):
+        # The first session may have been deleted with its participant, and of an earlier version.
+        return any(one.get("Name") == ran[0]["Name"] for one in listed)
+    return any(one in listed for one in ran)
 
 
 def _chains(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -12,25 +13,45 @@ from typing import Any
 from tactileq.modeling.errors import InputError, shortened, shown
 from tactileq.modeling.files.reading import read_text
 
+_PLACE = re.compile(r"line (?P<line>\d+), column (?P<column>\d+)")  # said in a message alone
+_COMMA = re.compile(r"=\s*(?P<number>[+-]?[\d_]+(?P<rest>,\d+(?:[eE][+-]?\d+)?))\s*")
+_CORRECT = "correct it"
 _TOO_DEEP = "values nested too deeply"
 _TOO_LARGE = "a whole number too large for any calculation"
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
     """The contents of a TOML file; InputError naming `what` is expected where it is none."""
-    text = read_text(path, what)
+    text, advice = read_text(path, what), _CORRECT
     try:
         values = tomllib.loads(text)
         _check_values(values)
     except tomllib.TOMLDecodeError as error:
-        got = f"something else ({shortened(str(error))})"
+        got, advice = _no_toml(text, str(error))
     except RecursionError:
         got = _TOO_DEEP
     except ValueError:
         got = _TOO_LARGE
     else:
         return values
-    raise InputError(f"expected TOML in {path}, got {got}; correct it.")
+    raise InputError(f"expected TOML in {path}, got {got}; {advice}.")
+
+
+def _no_toml(text: str, said: str) -> tuple[str, str]:
+    """What came in the place of TOML, by what tomllib said of it, and what to do.
+
+    A comma that may stand where it is, as between numbers of a list, is no error.
+    """
+    at = _PLACE.search(said)
+    if at is None:
+        return f"something else ({shortened(said)})", _CORRECT
+    line = text.replace("\r\n", "\n").split("\n")[int(at["line"]) - 1]
+    for found in _COMMA.finditer(line):
+        # By itself a value ends before the comma; in { … } a key begins behind it, and lacks its =.
+        if found.start("rest") < int(at["column"]) <= found.end() + 1:
+            got = f"a decimal comma in line {at['line']} ({shown(line.strip())})"
+            return got, f"write a point, {found['number'].replace(',', '.')}"
+    return f"something else in line {at['line']} ({shortened(said)})", _CORRECT
 
 
 def read_json_object(path: Path, *, advice: str, what: str = "a JSON file") -> dict[str, Any]:

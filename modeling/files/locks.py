@@ -81,7 +81,7 @@ class Lock:
             lock.acquire(timeout=wait_s)
             self._file = _identity(self.path)
         except Timeout:
-            raise HeldError(_holder(self.path)) from None
+            raise HeldError(holder(self.path)) from None
         except OSError as error:
             if error.errno in _NO_LOCKS:
                 with suppress(OSError):
@@ -147,7 +147,7 @@ def _sign(handle: int) -> None:
         os.write(handle, b" " * _HOLDER_FROM + f"{os.getpid()} {platform.node()}\n".encode())
 
 
-def _holder(path: Path) -> str:
+def holder(path: Path) -> str:
     """Who wrote into a lock file, in words."""
     try:
         handle = os.open(path, _READING)

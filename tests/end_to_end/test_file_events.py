@@ -13,7 +13,9 @@ import shutil
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from functools import partial
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -41,8 +43,8 @@ from tests.interrupting import Interrupter, forked
 __all__ = ["here"]
 
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
-MOST_HIDDEN = 12  # of the calls in a hidden folder
-MOST = 60  # of all calls; only of a whole simulated study there are more
+MOST_HIDDEN = 6  # of the calls in a hidden folder
+MOST = 60  # of the others; there are more only where a whole study is simulated
 SAMPLE = 4  # in make test, of each signal
 # What is already tried by another command of the same kind, but for what it reads.
 _ALIKE = {
@@ -53,6 +55,11 @@ _ALIKE = {
 WRITERS: dict[str, tuple[object, ...]] = {
     **{name: words for name, words in COMMANDS.items() if name not in _ALIKE},
     "record": ("record", "new", "--texture", "canvas", "--rate", 5000, "--seed", 1),
+    "model": ("model", "wet/canvas"),
+    "power": (
+        *("power", "two/study.toml", "--subjects", 4, "--simulations", 2, "--jobs", 1),
+        *("--effect", "magnitude_similarity=0"),
+    ),
     "study init": ("study", "init", "new.toml"),
     "study status": ("study", "status", "--data", "taken"),
     "study dropout": ("study", "dropout", 1, "--data", "taken", "--yes"),
@@ -92,6 +99,12 @@ class Swept:
         """A new copy, in which only data that grow are files of their own: that is quicker."""
         shutil.rmtree(self.place, ignore_errors=True)
         shutil.copytree(self._before, self.place, copy_function=_copy)
+
+    def load(self) -> None:
+        """Do it once in this process, so that no other one loads for itself what it needs."""
+        self.restore()
+        with chdir(self.place), redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+            assert self._work() == 0
 
     def run(self, work: Callable[[], int] | None = None, **at: Any) -> tuple[int, str, list[str]]:
         """Exit code, what was told, and the calls."""
@@ -172,6 +185,7 @@ def sweep(
     go_on : callable, optional
         What is done next, if it is not the same again.
     """
+    swept.load()
     ends = []
     for _ in range(2):
         swept.restore()
@@ -319,6 +333,7 @@ def sweep_session(tmp_path: Path, *, resume: bool, most: int | None = None) -> d
         tired = Stopping(1, after=2)
         run_one(before / "data", small_study(TEXTURES), MODELS, respondent=tired)
     swept = Swept(before, tmp_path, partial(session, resume=resume))
+    swept.load()
     swept.restore()
     code, told, calls = swept.run()
     assert code == 0, told

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tactileq.commands.study.check import study_check
 from tactileq.experiments.sessions.kept.traces import PRESENTATION_COLUMNS
 from tactileq.experiments.study.study import SHIPPED_STUDY, Study
 from tactileq.modeling import Threshold, simplify
@@ -152,6 +153,23 @@ def test_the_check_says_which_texts_no_native_speaker_has_read(place: Path, main
     check_refusal(done.stderr, expected="ja.toml", got="rest.titel")
 
 
+def test_what_takes_long_is_said_before_it_begins(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Also in a log, where no bar is seen before its end: sessions and trials to be drawn."""
+    told = []
+
+    def balance(*_: object, **__: object) -> list[object]:
+        told.append(capsys.readouterr().out)
+        return []
+
+    monkeypatch.setattr("tactileq.experiments.tasks.balance.balance_of", balance)
+    study_check(place / "study.toml")
+    # 20 · 16 and 2 · 24 · 21 main trials; each task with its minutes.
+    for fact in ("68 sessions", "1328 main trials", "min per session"):
+        assert fact in told[0]
+
+
 def test_the_check_says_what_catch_trials_cost(place: Path, main: Main) -> None:
     file = place / "study.toml"
     begun = '[oddity]\nparticipants = 24\nschedule = "interleaved"\nrepeats = 6\n'
@@ -166,6 +184,20 @@ def test_the_check_says_what_catch_trials_cost(place: Path, main: Main) -> None:
     done = main("study", "check", "study.toml")
     assert "2 training + 42 main trials" in done.stdout
     assert "catch" not in done.stdout
+
+
+def test_a_tray_that_names_a_texture_is_refused_before_the_study_runs(
+    place: Path, main: Main
+) -> None:
+    file = place / "study.toml"
+    whole = file.read_text(encoding="utf-8")
+    file.write_text(whole.replace('canvas = "B"', 'canvas = "mdf"'), encoding="utf-8")
+    assert Study.load(file).trays["canvas"] == "mdf"  # as what was stored before is still read
+    for words in (["study", "check"], ["study", "plan"], ["session", "--task=absolute", "--study"]):
+        refused = main(*words, "study.toml")
+        assert refused.returncode == 1
+        check_refusal(refused.stderr, names=["'canvas'", "[trays]"], got=["'mdf'", "'MDF'"])
+    assert not (place / "data").exists()
 
 
 def test_the_same_models_twice_are_refused(place: Path, main: Main) -> None:

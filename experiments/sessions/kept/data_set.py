@@ -17,7 +17,9 @@ from tactileq.modeling.errors import shown
 from tactileq.modeling.files.documents import dump_json, read_json_object
 from tactileq.modeling.files.places import locked
 
-BIDS_VERSION = "1.10.0"
+# All that a version of this program ever wrote, the present one last: earlier data keep theirs.
+BIDS_VERSIONS = ("1.10.0",)
+DATASET_TYPE = "raw"
 DESCRIPTION_NAME = "dataset_description.json"
 # What may differ for a stated reason; people and simulations never share a folder.
 MAY_DIFFER = {
@@ -93,8 +95,8 @@ def describe_data_set(manifest: SessionManifest) -> dict[str, Any]:
     described: dict[str, Any] = plain(
         {
             "Name": study.get("name", "not stated"),
-            "BIDSVersion": BIDS_VERSION,
-            "DatasetType": "raw",
+            "BIDSVersion": BIDS_VERSIONS[-1],
+            "DatasetType": DATASET_TYPE,
             "License": study.get("data_license", "not stated"),
             "Simulated": manifest.simulated,
             "SimulatedParticipant": manifest.simulated_participant,
@@ -104,7 +106,7 @@ def describe_data_set(manifest: SessionManifest) -> dict[str, Any]:
             "ModelsSHA256": manifest.models_sha256,
             **({"TextsSHA256": manifest.texts_sha256} if manifest.texts_sha256 else {}),
             "StudyDesign": study,
-            "GeneratedBy": [{"Name": "tactileq", "Version": manifest.versions.get("tactileq", "")}],
+            "GeneratedBy": [generated_by(manifest)],
         }
     )
     return described
@@ -115,6 +117,11 @@ def is_other(name: str, described: Mapping[str, Any], other: Mapping[str, Any]) 
     if name in _NOT_ALWAYS and not (name in described and name in other):
         return False
     return described.get(name) != other.get(name)
+
+
+def generated_by(manifest: SessionManifest) -> dict[str, str]:
+    """The program that a session was run by, as the description names it."""
+    return {"Name": "tactileq", "Version": manifest.versions.get("tactileq", "")}
 
 
 def _check(

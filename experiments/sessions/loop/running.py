@@ -30,6 +30,7 @@ from tactileq.experiments.sessions.store.session_store import SessionStore, requ
 from tactileq.experiments.study.design import SessionPlan
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.study import Study, plan_sha256
+from tactileq.experiments.study.trays import require_trays
 from tactileq.modeling import InputError
 from tactileq.rig.shared.interface import TextureRig
 
@@ -234,6 +235,7 @@ def _prepared(
     said = replace(said, language=study.language_of_session(said.language))
     _require_texts(study, said.texts)
     models.require(study, allow=overrides.allow)
+    require_trays(study, allow=overrides.allow)
     for stimulus in models.stimuli:
         rig.check_stimulus(stimulus)
     return said

@@ -139,7 +139,7 @@ TQ_INNER int tq_virtual_loop(tq_virtual *v, int port, int end, int other)
         ssize_t count = 0;
         now_s = tq_now();
         if (now_s - due_s > 0.02) {
-            v->device.values.ticks_late += (uint32_t)((now_s - due_s) * TQ_TICK_HZ);
+            v->device.values.ticks_late += (uint32_t)(uint64_t)((now_s - due_s) * TQ_TICK_HZ); /* modulo 2^32 */
             due_s = now_s;
         }
         for (; due_s <= now_s; due_s += 1.0 / TQ_TICK_HZ)

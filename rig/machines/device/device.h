@@ -70,7 +70,7 @@ typedef struct {
     /* The encoders. */
     uint16_t counts[TQ_MOTORS];
     int32_t counted[TQ_MOTORS], still[TQ_MOTORS]; /* since home; at the last move of each encoder */
-    int32_t most_still; /* counts of the other one in the meantime: 3 mm */
+    uint32_t most_still; /* counts of the other one in the meantime: 3 mm */
     int counting, homed;
     tq_number rest_mm[TQ_MOTORS], length_mm[TQ_MOTORS]; /* of the cables, at home and now */
     /* Speed along x: the tracking filter on one position in a millisecond. */
@@ -207,7 +207,7 @@ static inline void tq_device_start(tq_device *d, const tq_board *board)
     for (n = 0; n < TQ_MOTORS; n++)
         d->rest_mm[n] =
             tq_cable_length(&board->cables, n, board->cables.rest_x_mm, board->cables.rest_z_mm);
-    d->most_still = (int32_t)(3 / tq_force_size(board->cables.mm_per_count));
+    d->most_still = (uint32_t)tq_truncated(3 / tq_force_size(board->cables.mm_per_count));
     d->motor = tq_cable_motor(&board->cables, felt_s);
     d->m_s_per_count = board->cables.mm_per_count / 1000 / felt_s;
     tq_device_track(d);
@@ -234,7 +234,7 @@ static inline void tq_device_count(tq_device *d, const uint16_t counts[TQ_MOTORS
     int n;
     for (n = 0; n < TQ_MOTORS; n++) {
         uint16_t moved = d->counting ? (uint16_t)(counts[n] - d->counts[n]) : 0;
-        d->counted[n] += moved < 0x8000 ? (int32_t)moved : (int32_t)moved - 0x10000; /* modulo 2^16 */
+        d->counted[n] = tq_counts_on(d->counted[n], moved);
         d->counts[n] = counts[n];
         d->length_mm[n] = d->rest_mm[n] + (tq_number)d->counted[n] * d->board.cables.mm_per_count;
     }
@@ -244,7 +244,7 @@ static inline void tq_device_count(tq_device *d, const uint16_t counts[TQ_MOTORS
 /* Whether one encoder has stood still while the other one went on for 3 mm. */
 static inline int tq_device_stuck(tq_device *d)
 {
-    int32_t moved[TQ_MOTORS];
+    uint32_t moved[TQ_MOTORS];
     int n;
     if (!d->force.engaged) { /* no wall can push; on the way to the real surface one encoder may well stand still */
         for (n = 0; n < TQ_MOTORS; n++)
@@ -252,7 +252,7 @@ static inline int tq_device_stuck(tq_device *d)
         return 0;
     }
     for (n = 0; n < TQ_MOTORS; n++)
-        moved[n] = d->counted[n] > d->still[n] ? d->counted[n] - d->still[n] : d->still[n] - d->counted[n];
+        moved[n] = tq_counts_apart(d->counted[n], d->still[n]);
     if ((moved[0] == 0 && moved[1] > d->most_still) || (moved[1] == 0 && moved[0] > d->most_still))
         return 1;
     if (moved[0] != 0 && moved[1] != 0)
@@ -426,7 +426,7 @@ static inline void tq_device_add(uint64_t *sum, float *left, float square)
 {
     uint32_t whole;
     *left += square < 4000 ? square : 4000; /* of five samples at most 2000 but with an odd weighting */
-    whole = (uint32_t)(*left * 1e6f);
+    whole = *left > 0 ? (uint32_t)(*left * 1e6f) : 0; /* rounding may leave a rest below 0 */
     *sum += whole, *left -= (float)whole * 1e-6f;
 }
 

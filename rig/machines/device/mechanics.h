@@ -188,7 +188,7 @@ static inline void tq_mechanics_tick(tq_mechanics *m, const tq_cables *c, const 
 static inline int32_t tq_mechanics_counted(const tq_mechanics *m, const tq_cables *c, int n)
 {
     tq_number exact = m->paid_mm[n] / c->mm_per_count;
-    return (int32_t)(exact < 0 ? exact - (tq_number)0.5 : exact + (tq_number)0.5);
+    return tq_truncated(exact < 0 ? exact - (tq_number)0.5 : exact + (tq_number)0.5);
 }
 
 #endif

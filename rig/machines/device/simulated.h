@@ -94,7 +94,7 @@ static inline void tq_simulated_count(tq_simulated *s, const tq_cables *c)
         int32_t count = tq_mechanics_counted(&s->mechanics, c, n);
         if (n == TQ_LEFT && s->stuck)
             continue;
-        s->counts[n] = (uint16_t)((uint32_t)(s->flipped ? -count : count) + s->offset[n]);
+        s->counts[n] = (uint16_t)((s->flipped ? 0u - (uint32_t)count : (uint32_t)count) + s->offset[n]);
         if (s->unplugged)
             s->counts[n] = 0;
     }

@@ -11,6 +11,7 @@
 #include "cables.h"
 #include "observer.h"
 
+#include <limits.h>
 #include <stdint.h>
 
 /* The observer's motor in kg, N/A, N and m/s at the cable; the spring on the pulley helps, like gravity. One count
@@ -39,11 +40,11 @@ static inline void tq_feel(tq_felt *f, const tq_motor *m, tq_number current_a, i
 {
     const tq_number share = m->speed_cut * m->step_s;
     if (f->begun) {
-        f->speed_m_s += share * ((tq_number)(f->counted - counted) * m_s_per_count - f->speed_m_s);
+        f->speed_m_s += share * ((tq_number)tq_counts_since(f->counted, counted) * m_s_per_count - f->speed_m_s);
         f->current_a += share * (current_a - f->current_a);
         tq_observe(&f->observer, m, f->current_a, f->speed_m_s);
         f->told_n += m->reaction_cut * m->step_s * (f->current_a * m->n_m_per_a - m->gravity_n_m - f->told_n);
-        f->slack = f->told_n >= (tq_number)0.2 && f->observer.reaction_n_m < f->told_n / 2 ? f->slack + 1 : 0;
+        f->slack = f->told_n >= (tq_number)0.2 && f->observer.reaction_n_m < f->told_n / 2 ? f->slack + (f->slack < INT_MAX) : 0;
     }
     f->begun = 1, f->counted = counted;
 }

@@ -181,7 +181,7 @@ const char *dhdGetSystemName(char id)
 
 int dhdGetSerialNumber(unsigned short *serial, char id)
 {
-    *serial = (unsigned short)(tq_the_device->serial + id);
+    *serial = (unsigned short)((unsigned)tq_the_device->serial + (unsigned)id);
     return 0;
 }
 

@@ -66,7 +66,7 @@ typedef struct {
     tq_found found;
     int phase, reason, again; /* whether what was sensed does not count any more */
     int enough;               /* whether the sensor has what it needs */
-    int marks_then;           /* when the record ended: the next mark says whether the turntable slipped at its end */
+    uint32_t marks_then;      /* when the record ended: the next mark says whether the turntable slipped at its end */
     uint32_t tick, began, since, steady; /* ticks: ever, at the begin, in this phase, within tolerance */
     /* Sensed. */
     int sensed;
@@ -74,7 +74,8 @@ typedef struct {
     int32_t turned[TQ_AXES];            /* counts, since the start */
     tq_number speed_rad_s[TQ_AXES];
     uint32_t still[TQ_AXES];            /* ticks under a current that must turn it */
-    int mark, marks;                    /* whether one is seen; how many since the index */
+    int mark;                           /* whether one is seen */
+    uint32_t marks;                     /* how many since the index */
     int32_t at_mark, at_index;          /* counts of the motor */
     int32_t from;                       /* counts of the contactor when it began to go down */
     int indexed;
@@ -147,9 +148,9 @@ static inline void tq_recorder_count(tq_recorder *r, const uint16_t counter[TQ_A
     for (n = 0; n < TQ_AXES; n++) {
         const tq_motor *m = &r->limits.motor[n];
         uint16_t moved = r->sensed ? (uint16_t)(counter[n] - r->counter[n]) : 0;
-        int32_t steps = moved < 0x8000 ? (int32_t)moved : (int32_t)moved - 0x10000;
+        int32_t steps = tq_counts_on(0, moved);
         tq_number speed = (tq_number)steps / r->limits.counts[n] * turn / m->step_s;
-        r->turned[n] = (int32_t)((uint32_t)r->turned[n] + (uint32_t)steps), r->counter[n] = counter[n];
+        r->turned[n] = tq_counts_on(r->turned[n], moved), r->counter[n] = counter[n];
         r->speed_rad_s[n] += m->speed_cut * m->step_s * (speed - r->speed_rad_s[n]);
         r->still[n] = steps == 0 ? r->still[n] + 1 : 0;
         tq_observe(&r->observer[n], m, r->current_a[n], r->speed_rad_s[n]);
@@ -162,7 +163,7 @@ static inline int tq_recorder_marks(tq_recorder *r, int mark, int index)
 {
     int rises = mark && !r->mark, wrong = TQ_NO_REASON;
     const tq_number between = r->limits.counts[TQ_TABLE] / TQ_MARKS;
-    tq_number moved = (tq_number)(r->turned[TQ_TABLE] - r->at_mark);
+    tq_number moved = (tq_number)tq_counts_since(r->turned[TQ_TABLE], r->at_mark);
     r->mark = mark;
     if (!rises) /* nor where none comes: the turntable stands */
         return moved > (tq_number)1.2 * between ? TQ_SLIPS : TQ_NO_REASON;
@@ -181,8 +182,8 @@ static inline int tq_recorder_marks(tq_recorder *r, int mark, int index)
 /* Where the ball is on the sample: turns since the index, 0 to 1. */
 static inline tq_number tq_recorder_place(const tq_recorder *r)
 {
-    tq_number turns = (tq_number)(r->turned[TQ_TABLE] - r->at_index) / r->limits.counts[TQ_TABLE];
-    turns -= (tq_number)(int32_t)turns;
+    tq_number turns = (tq_number)tq_counts_since(r->turned[TQ_TABLE], r->at_index) / r->limits.counts[TQ_TABLE];
+    turns -= (tq_number)tq_truncated(turns);
     return turns < 0 ? turns + 1 : turns;
 }
 
@@ -226,7 +227,7 @@ static inline void tq_recorder_judge(tq_recorder *r)
     case TQ_LOWERS:
         if (r->mean_force > l->touch_n) { /* a counter that stands still looks like a surface */
             tq_recorder_phase(r, TQ_SETTLES);
-            if (r->turned[TQ_ARM] - r->from < l->least_counts)
+            if (tq_counts_since(r->turned[TQ_ARM], r->from) < l->least_counts)
                 tq_recorder_fail(r, TQ_ENCODER_STUCK);
         }
         else if (late)
@@ -264,7 +265,7 @@ static inline void tq_recorder_judge(tq_recorder *r)
         break;
     case TQ_LIFTS:
         r->steady = r->speed_rad_s[TQ_ARM] > -l->lift_rad_s / 8 ? r->steady + 1 : 0; /* at its stop */
-        if (r->marks > r->marks_then
+        if (r->marks != r->marks_then
             && ((tq_number)r->steady * step_s > (tq_number)0.05 || (tq_number)r->since * step_s > 1))
             tq_recorder_phase(r, TQ_RECORDED), r->found.duration_s = (tq_number)(r->tick - r->began) * step_s;
         break;

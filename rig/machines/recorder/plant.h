@@ -35,7 +35,8 @@ typedef struct {
     tq_plant_parts parts;
     double motor_rad, disc_rad, arm_rad, motor_rad_s, disc_rad_s, arm_rad_s;
     double contact_n, above_k[TQ_AXES];
-    int hops, touches; /* how often the ball left the sample; whether it is on it */
+    uint32_t hops; /* how often the ball left the sample */
+    int touches;   /* whether it is on it */
     int stuck[TQ_AXES]; /* whether an encoder stands still */
     uint16_t counter[TQ_AXES];
 } tq_plant;
@@ -64,7 +65,7 @@ static inline void tq_plant_contact(tq_plant *p)
     double faster = q->arm_m * p->arm_rad_s + q->wobble_m * cos(p->disc_rad) * p->disc_rad_s;
     double force = q->contact_n_per_m * deep + q->contact_n_s_per_m * faster;
     int touches = deep > 0 && force > 0;
-    p->hops += p->touches && !touches;
+    p->hops += (uint32_t)(p->touches && !touches);
     p->touches = touches;
     p->contact_n = touches ? force : 0;
 }
@@ -90,6 +91,13 @@ static inline void tq_plant_move(tq_plant *p, const tq_number current_a[TQ_AXES]
         p->arm_rad = 0, p->arm_rad_s = p->arm_rad_s < 0 ? 0 : p->arm_rad_s;
 }
 
+/* A counter modulo 2^16 at so many counts; of a place that is no number 0. */
+static inline uint16_t tq_plant_counter(double counts)
+{
+    double rest = fmod(floor(counts), 65536);
+    return rest == rest ? (uint16_t)(int32_t)rest : 0;
+}
+
 /* One tick with these currents, and what the law reads then. */
 static inline void tq_plant_tick(tq_plant *p, const tq_number current_a[TQ_AXES], double step_s)
 {
@@ -105,7 +113,7 @@ static inline void tq_plant_tick(tq_plant *p, const tq_number current_a[TQ_AXES]
     at[TQ_TABLE] = p->motor_rad, at[TQ_ARM] = p->arm_rad;
     for (n = 0; n < TQ_AXES; n++)
         if (!p->stuck[n])
-            p->counter[n] = (uint16_t)(int64_t)floor(at[n] / turn * p->parts.counts[n]);
+            p->counter[n] = tq_plant_counter(at[n] / turn * p->parts.counts[n]);
 }
 
 /* Whether a mark of the turntable is before its sensor, and whether it is the index. */
@@ -113,7 +121,7 @@ static inline int tq_plant_mark(const tq_plant *p, int *index)
 {
     double turns = p->disc_rad / 6.283185307179586, marks = turns * TQ_MARKS;
     double within = marks - floor(marks);
-    *index = within < 0.2 && (int64_t)floor(marks) % TQ_MARKS == 0;
+    *index = within < 0.2 && fmod(floor(marks), TQ_MARKS) == 0;
     return within < 0.2;
 }
 

@@ -114,8 +114,8 @@ static inline void tq_sleep_until(double time_s)
 /* Waits until one of some descriptors is as wanted, or the moment has come; as poll. */
 TQ_INNER int tq_poll_until(struct pollfd *on, nfds_t count, double time_s)
 {
-    double left_s = time_s - tq_now();
-    return poll(on, count, left_s > 0 ? 1 + (int)(1e3 * left_s) : 0);
+    double left_s = time_s - tq_now(), wait_s = left_s < 2e6 ? left_s : 2e6; /* in ms an int */
+    return poll(on, count, left_s > 0 ? 1 + (int)(1e3 * wait_s) : 0);
 }
 #endif
 
@@ -293,14 +293,22 @@ TQ_INNER void tq_doze(long nanoseconds)
     nanosleep(&wait, NULL);
 }
 
+/* Seconds as the system has them: none below 0, and at most 63 years. */
+TQ_INNER struct timespec tq_timespec(double seconds)
+{
+    struct timespec time;
+    seconds = seconds > 0 ? seconds < 2e9 ? seconds : 2e9 : 0;
+    time.tv_sec = (time_t)seconds;
+    time.tv_nsec = (long)(1e9 * (seconds - (double)time.tv_sec));
+    return time;
+}
+
 /* Returns at the moment, or soon after. */
 static inline void tq_sleep_until(double time_s)
 {
     const struct timespec longest = { 0, 20000000 };
-    struct timespec until;
     if (!tq_the_clock) {
-        until.tv_sec = (time_t)time_s;
-        until.tv_nsec = (long)(1e9 * (time_s - (double)until.tv_sec));
+        const struct timespec until = tq_timespec(time_s);
         while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL) == EINTR) {
         }
         return;
@@ -323,12 +331,11 @@ static inline void tq_sleep_until(double time_s)
    returns once a slice, too. */
 TQ_INNER int tq_poll_until(struct pollfd *on, nfds_t count, double time_s)
 {
-    struct timespec wait = { 0, 0 };
     double left_s = time_s - tq_now();
+    struct timespec wait = { 0, 0 };
     int found;
     if (!tq_the_clock) {
-        left_s = left_s < 0 ? 0 : left_s;
-        wait.tv_sec = (time_t)left_s, wait.tv_nsec = (long)(1e9 * (left_s - (double)wait.tv_sec));
+        wait = tq_timespec(left_s);
         return (int)syscall(SYS_ppoll, on, count, &wait, NULL, 0);
     }
     /* Once before and once after: each look at a pseudo-terminal waits for a thread of the kernel. */

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tactileq.modeling.errors import counted
 from tactileq.options import StudyArgument
-from tactileq.printing import print_models, share_of
+from tactileq.printing import print_models, progress, share_of
 
 if TYPE_CHECKING:
     from tactileq.experiments.study.models import ModelSets
@@ -43,11 +43,13 @@ def loaded(path: Path, reads: Callable[..., None] = lambda *paths: None) -> tupl
     from tactileq.experiments.console.languages import texts_of_study
     from tactileq.experiments.study.models import load_model_sets
     from tactileq.experiments.study.study import Study
+    from tactileq.experiments.study.trays import require_trays
 
     reads(path)
     plan = Study.load(path)
     reads(*plan.texts.values())
     texts_of_study(plan)
+    require_trays(plan)
     if any(place.endswith(".toml") for place in plan.models.values()):
         with share_of("Compiling the scene") as advance:
             sets = load_model_sets(plan, path.parent, reads=reads, progress=advance)
@@ -102,7 +104,17 @@ def _print_sessions(plan: Study) -> None:
 
 def _print_balance(plan: Study) -> None:
     from tactileq.experiments.tasks.balance import balance_of
+    from tactileq.experiments.tasks.durations import trials_of_session
 
+    sessions = {
+        task: planned.participants * plan.sessions(task) for task, planned in plan.tasks.items()
+    }
+    trials = sum(count * trials_of_session(plan, task)[1] for task, count in sessions.items())
+    said = f"{counted(sum(sessions.values()), 'session')} with {counted(trials, 'main trial')}"
+    # At once: of a study with thousands of participants the orders take minutes.
+    print(f"drawing the orders of {said}, all of them, to count their balance", flush=True)
+    with progress("orders", sum(sessions.values())) as drawn:
+        rows = [row for task in plan.tasks for row in balance_of(plan, task, drawn=drawn)]
     print("balance of the orders (lowest to highest count, of the total):")
-    for row in (row for task in plan.tasks for row in balance_of(plan, task)):
+    for row in rows:
         print(f"  {row.task:9} {row.what:56} {row.least} to {row.most} of {row.of}")

@@ -37,6 +37,16 @@ def test_the_papers_study_is_balanced() -> None:
     assert found == [(12, 12, 24), (3, 3, 21), (144, 144, 1008)]
 
 
+def test_who_waits_is_told_of_each_order_that_is_drawn(study: Study) -> None:
+    told: list[str] = []
+    for task in study.tasks:
+        before = len(told)
+        assert balance_of(study, task, drawn=told.append) == balance_of(study, task)
+        sessions = study.plan_of(task).participants * study.sessions(task)
+        assert len(told) - before == sessions > 0
+    assert len(set(told)) == len(told)
+
+
 def test_imbalance_is_counted(study: Study) -> None:
     """Three participants, three textures: nobody can get half."""
     rows = balance_of(study, "absolute")

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import json
 import random
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from tactileq.experiments.sessions.kept import data_set
 from tactileq.experiments.sessions.kept.log import line_of, read_log
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
+from tactileq.experiments.sessions.kept.stored_sessions import held_sessions
 from tactileq.experiments.sessions.store.session_store import SessionStore
+from tactileq.experiments.sessions.store.withdrawing import withdraw
 from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.verification.verifying import verify_data
 from tactileq.modeling import InputError
@@ -119,6 +123,74 @@ def test_sealing_anew_what_was_not_changed_is_no_difference(anew: Kind, copied: 
     anew(copied)
     found = verify_data(copied)
     assert (found.differences, len(found.sessions)) == ((), 4)
+
+
+def described(root: Path, **values: object) -> list[str]:
+    """Places that differ once the description states these; None takes a key away."""
+    path = root / "dataset_description.json"
+    known = json.loads(path.read_text("utf-8"))
+    kept = {name: value for name, value in {**known, **values}.items() if value is not None}
+    path.write_text(json.dumps(kept), encoding="utf-8")
+    return [one.place for one in verify_data(root).differences]
+
+
+@pytest.mark.parametrize("name", ["BIDSVersion", "DatasetType", "GeneratedBy"])
+def test_no_flipped_bit_in_what_the_program_describes_itself_by_is_accepted(
+    name: str, copied: Path
+) -> None:
+    path = copied / "dataset_description.json"
+    whole = path.read_bytes()
+    (stated,) = re.finditer(rb'  "%s": .*?(?=,?\n(  "|}))' % name.encode(), whole, re.DOTALL)
+    letters = [at for at in range(*stated.span()) if whole[at : at + 1].isalnum()]
+    assert len(letters) > len(name)
+    for at in letters:
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
+        found = [one.place for one in verify_data(copied).differences]
+        assert found == ["dataset_description.json"], path.read_bytes()[at - 20 : at + 20]
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"BIDSVersion": None},
+        {"BIDSVersion": ["1.10.0"]},
+        {"DatasetType": "derivative"},
+        {"GeneratedBy": None},
+        {"GeneratedBy": []},
+        {"GeneratedBy": {"Name": "tactileq"}},
+        {"GeneratedBy": [{"Name": "tactileq", "Version": "0.0.9"}]},
+    ],
+)
+def test_another_program_or_version_than_that_of_the_sessions_is_found(
+    values: dict[str, object], copied: Path
+) -> None:
+    assert described(copied, **values) == ["dataset_description.json"]
+
+
+def test_what_is_for_people_to_fill_in_is_theirs(copied: Path) -> None:
+    assert not described(copied, License="CC0", Authors=["A. Person"], Funding=["none"])
+    made = json.loads((copied / "dataset_description.json").read_text("utf-8"))["GeneratedBy"]
+    assert not described(copied, GeneratedBy=[{"Name": "pandas"}, *made])
+
+
+def test_data_of_an_earlier_version_are_as_that_one_described_them(
+    copied: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither a new version of BIDS nor one of the program makes them different."""
+    later = (*data_set.BIDS_VERSIONS, "1.99.0")
+    monkeypatch.setattr(data_set, "BIDS_VERSIONS", later)
+    monkeypatch.setattr("tactileq.experiments.verification.verifying.BIDS_VERSIONS", later)
+    assert verify_data(copied).differences == ()
+    assert not described(copied, BIDSVersion="1.99.0")
+
+
+def test_an_earlier_version_may_have_run_a_session_that_was_withdrawn(copied: Path) -> None:
+    earlier = [{"Name": "tactileq", "Version": "0.0.9"}]
+    assert described(copied, GeneratedBy=earlier)
+    first = min(held_sessions(copied)[0], key=lambda one: one.state.begun_utc)
+    withdraw(copied, first.files.subject)
+    assert not described(copied, GeneratedBy=earlier)
+    assert described(copied, GeneratedBy=[{"Name": "tactileo", "Version": "0.0.9"}])
 
 
 def test_no_flipped_bit_in_a_log_is_accepted(copied: Path) -> None:

@@ -84,6 +84,27 @@ def test_a_whole_number_stays_one_where_it_is_said() -> None:
 
 
 @pytest.mark.parametrize(
+    ("keys", "meant"),
+    [
+        ({"sped_hz": 1}, ["speed_hz"]),
+        ({"Speed_Hz": 1}, ["speed_hz"]),
+        ({"speed-hz": 1, "tooth": 3, "texture": ["a"]}, ["speed_hz", "textures"]),
+        ({"speed": 1}, ["speed_hz"]),
+        ({"velocity": 1}, []),
+        ({"x": 1}, []),
+    ],
+)
+def test_a_misspelt_key_is_told_which_may_be_meant(
+    keys: dict[str, object], meant: list[str]
+) -> None:
+    with refused(InputError, names="[machine]", got=list(keys)) as caught:
+        machine(**keys)
+    said = str(caught.value).partition("got")[2]
+    assert [name for name in ("speed_hz", "teeth", "textures", "mode") if name in said] == meant
+    assert ("mean" in said) == bool(meant)
+
+
+@pytest.mark.parametrize(
     ("name", "value", "expected"),
     [
         ("speed_hz", 21, ["number", "0", "20 Hz"]),

@@ -116,3 +116,62 @@ def test_quotes_in_messages() -> None:
     assert shortened("two\nlines") == "two lines"
     assert shortened("x" * 100) == "x" * 59 + "…"
     assert shortened(" " * 1000 + "x") == "…"
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "point"),
+    [
+        ("name = 'x'\nlongest_gap_min = 0,5\n", 2, "0.5"),
+        ("longest_gap_min=0,5 # a comment", 1, "0.5"),
+        ("a = 1\r\nb = -1_000,25\r\nc = 1\r\n", 2, "-1_000.25"),
+        ("a = 1,5e3", 1, "1.5e3"),
+        ('[sound]\n\npeak = { value = 0,5, unit = "g" }', 3, "0.5"),
+        ("peak = { unit = 'g', value = 2,25 }", 1, "2.25"),
+        ("a = [\n  { value = 0,5 },\n]", 2, "0.5"),
+    ],
+)
+def test_a_decimal_comma_is_called_so(tmp_path: Path, text: str, line: int, point: str) -> None:
+    path = tmp_path / "study.toml"
+    path.write_bytes(text.encode())
+    with refused(
+        InputError, names=path, expected="TOML", got=["decimal comma", f"line {line}", point]
+    ):
+        read_toml(path, "a study file")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a = [0,5]",
+        "a = [\n  0,5,\n  1,5,\n]",
+        "a = { x = 1,5 = 3 }",
+        "a = '= 0,5'\nb = 0.5  # not = 0,5",
+        'a = """\nb = 0,5\n"""',
+    ],
+)
+def test_commas_of_lists_tables_and_texts_are_none(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(text)
+    assert read_toml(path, "a study file")
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("a = '= 0,5'\nb = ", None),
+        ("a = 0.5\nb = [1,2] 3", 2),
+        ("a = { x = 1, y = }", 1),
+        ("a = 1, b = 2", 1),
+        ("a = '0,5", None),
+        ("# a = 0,5\nb = 2 3 # = 0,5", 2),
+    ],
+)
+def test_what_else_is_no_toml_is_said_with_its_line(
+    tmp_path: Path, text: str, line: int | None
+) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(text)
+    facts = "something else" if line is None else f"line {line}"
+    with refused(InputError, expected=["TOML", path], got=facts) as caught:
+        read_toml(path, "a study file")
+    assert "decimal" not in str(caught.value)

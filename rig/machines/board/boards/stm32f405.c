@@ -167,7 +167,7 @@ int board_write(int output, tq_number value)
         return 0;
     }
 #endif
-    value = value < 0 ? 0 : value > AMPERES_AT_FULL ? AMPERES_AT_FULL : value;
+    value = !(value > 0) ? 0 : value > AMPERES_AT_FULL ? AMPERES_AT_FULL : value; /* of no number none */
     TIMER(TIMER_8, output == 0 ? 0x3C : 0x40) = (uint32_t)(value / AMPERES_AT_FULL * PWM_STEPS);
 #ifdef TQ_SIMULATED
     return 0;

@@ -185,6 +185,19 @@ def test_full_and_simplified_exchanged_are_refused_or_recorded(
     assert record == {"what": "exchanged models", "reason": "the names are meant so"}
 
 
+def test_a_tray_that_names_its_texture_is_refused_or_recorded_and_read_again(
+    run: Callable[..., Any], small: Study, tmp_path: Path
+) -> None:
+    telling = replace(small, trays={"canvas": "Canvas", "PVC": "B"})
+    with refused(InputError, names="--override", got=["'Canvas'", "'canvas'"]):
+        run(study=telling, folder=tmp_path / "none")
+    assert not (tmp_path / "none").exists()
+    _, manifest = run(study=telling, override="they were painted long ago")
+    stored = SessionManifest.load(manifest)
+    assert stored.overrides == ({"what": "telling trays", "reason": "they were painted long ago"},)
+    assert Study.from_dict(stored.study) == telling
+
+
 def test_a_rig_that_refuses_leaves_nothing(
     run: Callable[..., Any], rig: Any, tmp_path: Path
 ) -> None:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
+from tests.sanitizing import SANITIZERS
+
 ROOT = Path(__file__).parents[4]
-CHECKED = ("-O0", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+CHECKED = ("-O0", *SANITIZERS)
 STRICT = ("-Wall", "-Wextra", "-Werror", "-Wno-unused-function")
 
 

@@ -4,10 +4,12 @@
    walks limits SEED TICKS   random hand, faults and commands; prints what was broken
    walks damaged SEED COUNT  frames damaged at random, and a good one after each
    walks silences COUNT      a host that falls silent; ticks from its last frame to no current
+   walks extremes SEED TICKS any counters from any count, mechanics that run away; what the sanitizers find
    walks frames              frames as lines of "kind sequence nonce body" in, their bytes out, and back */
 
 #include "virtual.h"
 
+#include <limits.h>
 #include <stdio.h>
 
 static unsigned long long state_of_chance;
@@ -371,6 +373,66 @@ static int silences(long count)
     return 0;
 }
 
+/* --- Extremes -------------------------------------------------------------------------------------- */
+
+static double extreme(void)
+{
+    static const double values[8] = { NAN, INFINITY, -INFINITY, 1e300, -1e300, 1e10, -1e10, 0 };
+    return values[below(8)];
+}
+
+/* A board of which anything may be the case. */
+static void spoil(tq_virtual *v)
+{
+    tq_mechanics *m = &v->simulated.mechanics;
+    int n = (int)below(2);
+    switch (below(8)) {
+    case 0: v->device.counted[n] = below(2) ? INT32_MAX : INT32_MIN; break;
+    case 1: v->device.still[n] = below(2) ? INT32_MAX : INT32_MIN; break;
+    case 2: v->device.felt[n].counted = below(2) ? INT32_MAX : INT32_MIN, v->device.felt[n].slack = INT_MAX; break;
+    case 3: m->paid_mm[n] = extreme(); break;
+    case 4: m->x_mm = extreme(), m->z_mm = extreme(); break;
+    case 5: m->vx_mm_s = extreme(), m->mass_s = extreme(); break;
+    case 6: v->device.values.tick = UINT32_MAX - below(100); break;
+    default: v->device.simulate = (int)below(10); break;
+    }
+}
+
+static int extremes(unsigned long long seed, long ticks)
+{
+    tq_virtual *v = (tq_virtual *)malloc(sizeof *v);
+    long n, stuck = 0, wrapped = 0, sources = 0;
+    state_of_chance = seed;
+    tq_virtual_start(v, 1, 0);
+    for (n = 0; n < ticks; n++) {
+        int32_t before = v->device.counted[0];
+        if (!v->device.greeted)
+            say(v, TQ_HELLO, NULL, 0);
+        if (below(200) == 0)
+            tq_simulated_start(&v->simulated, 0), v->device.board.cables = tq_usual_cables();
+        if (below(20) == 0)
+            spoil(v);
+        if (below(20) == 0)
+            v->device.force.state = (int)below(TQ_STATES);
+        if (below(50) == 0)
+            v->device.values.source = (uint8_t)below(3), v->device.samples_in += below(5), sources++;
+        if (below(2)) {
+            tq_virtual_step(v, 1);
+        } else { /* whatever the counters say */
+            uint16_t counts[TQ_MOTORS] = { (uint16_t)below(65536), v->device.counts[1] };
+            counts[1] = (uint16_t)(below(2) ? below(65536) : counts[1]);
+            tq_device_tick(&v->device, counts, (int)below(2), 1);
+        }
+        v->waiting = 0;
+        v->device.force.engaged = below(10) > 0;
+        stuck += tq_device_stuck(&v->device);
+        wrapped += (before > 0) != (v->device.counted[0] > 0) && (before > 1 << 30 || before < -(1 << 30));
+    }
+    printf("ticks %ld stuck %ld wrapped %ld sources %ld\n", ticks, stuck, wrapped, sources);
+    free(v);
+    return 0;
+}
+
 /* --- Frames ---------------------------------------------------------------------------------------- */
 
 static size_t from_hex(const char *text, uint8_t *out)
@@ -416,6 +478,8 @@ int main(int count, char **arguments)
         return damaged(strtoull(arguments[2], NULL, 10), atol(arguments[3]));
     if (count == 3 && !strcmp(arguments[1], "silences"))
         return silences(atol(arguments[2]));
+    if (count == 4 && !strcmp(arguments[1], "extremes"))
+        return extremes(strtoull(arguments[2], NULL, 10), atol(arguments[3]));
     if (count == 2 && !strcmp(arguments[1], "frames"))
         return frames();
     return 2;

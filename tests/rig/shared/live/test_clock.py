@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from math import inf, nan
 
 import pytest
 
@@ -26,6 +27,7 @@ from tactileq.rig.shared.live.clock import (
     taking_part,
     wait_for,
 )
+from tactileq.rig.shared.live.compiled import compiled
 from tactileq.rig.shared.live.memory import Live
 from tests.refusals import refused
 
@@ -178,3 +180,20 @@ def test_who_hangs_is_waited_for_no_longer_and_named(clock: GivenClock) -> None:
     assert clock.hung == f"thread {thread.native_id} of process {os.getpid()}"
     done.set()
     thread.join()
+
+
+@pytest.mark.parametrize("time_s", [nan, -inf, -1.0, -1e300])
+def test_a_moment_that_is_over_or_none_is_not_waited_for(time_s: float) -> None:
+    compiled().lib.tq_sleep_until(time_s)
+    assert compiled().lib.tq_wait_readable(-1, -1, time_s if time_s == time_s else 0.0) == 0
+
+
+@pytest.mark.parametrize("time_s", [inf, 1e300, 1e19])
+def test_a_moment_that_never_comes_ends_no_wait_but_what_is_waited_for_does(time_s: float) -> None:
+    reading, writing = os.pipe()
+    try:
+        os.write(writing, b"x")
+        assert compiled().lib.tq_wait_readable(reading, -1, time_s) == 1
+    finally:
+        os.close(reading)
+        os.close(writing)
