@@ -84,12 +84,10 @@ def session(
     )
     from tactileq.experiments.sessions.loop.trial_loop import People
     from tactileq.experiments.study.study import Study
-    from tactileq.experiments.study.trays import require_trays
     from tactileq.experiments.tasks import task_named
 
     plan = Study.load(study)
     texts = texts_of_study(plan)
-    require_trays(plan, allow=Overrides(override).allow)
     sets, sources = models_of_study(plan, study, models=models, simplified=simplified, scene=scene)
     if resume and not language:
         language = _language_of(data, task=task, subject=subject, session=number)
