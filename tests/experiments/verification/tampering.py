@@ -353,7 +353,7 @@ def session_replaced_by_another_persons(root: Path) -> None:
             event = next(e for e in own if e["event"] == event["event"])
         elif event["event"] == "answer":
             names = ("phase", "texture", "model", "tray", "virtual_texture", "first_surface")
-            trial = planned[event["trial"]]
+            trial = planned[event["row"]["repeats"] or event["trial"]]  # training that was repeated
             event["row"] |= {name: trial[name] for name in names if name in trial}
         changed.append(event)
     assert given
