@@ -44,11 +44,10 @@ __all__ = ["here"]
 
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 MOST_HIDDEN = 6  # of the calls in a hidden folder
-MOST = 60  # of the others; there are more only where a whole study is simulated
 SAMPLE = 4  # in make test, of each signal
-# What is already tried by another command of the same kind, but for what it reads.
+# What is already tried by another command of the same kind, but for what it reads, or as a session.
 _ALIKE = {
-    *("a picture of recordings", "scene of a recorded hand", "stimuli of a scene"),
+    *("simulate", "a picture of recordings", "scene of a recorded hand", "stimuli of a scene"),
     *("stimuli of a model", "simulate a scene", "simulate a scene of other models"),
     *("chart of recordings", "import csv"),
 }
@@ -56,10 +55,6 @@ WRITERS: dict[str, tuple[object, ...]] = {
     **{name: words for name, words in COMMANDS.items() if name not in _ALIKE},
     "record": ("record", "new", "--texture", "canvas", "--rate", 5000, "--seed", 1),
     "model": ("model", "wet/canvas"),
-    "power": (
-        *("power", "two/study.toml", "--subjects", 4, "--simulations", 2, "--jobs", 1),
-        *("--effect", "magnitude_similarity=0"),
-    ),
     "study init": ("study", "init", "new.toml"),
     "study status": ("study", "status", "--data", "taken"),
     "study dropout": ("study", "dropout", 1, "--data", "taken", "--yes"),
@@ -154,10 +149,10 @@ def hidden(folder: Path) -> list[str]:
 
 
 def moments(calls: Sequence[str]) -> list[int]:
-    """After which calls a run is ended; see MOST_HIDDEN and MOST."""
+    """After which calls a run is ended: all that others can see, see MOST_HIDDEN."""
     inside = [n for n, call in enumerate(calls, 1) if ".unfinished/" in call]
     outside = [n for n in range(1, len(calls) + 1) if n not in set(inside)]
-    return sorted({*evenly(inside, MOST_HIDDEN), *evenly(outside, MOST)})
+    return sorted({*evenly(inside, MOST_HIDDEN), *outside})
 
 
 def evenly(places: Sequence[int], most: int) -> list[int]:
@@ -193,12 +188,17 @@ def sweep(
         assert code == 0, told
         ends.append(contents(swept.place))
     swept.restore()
-    fixed = {name: data for name, data in ends[0].items() if ends[1].get(name) == data}
+    # The provenance of what is added to may name the run that was ended, too.
+    fixed = {
+        name: data
+        for name, data in ends[0].items()
+        if ends[1].get(name) == data and not name.endswith("provenance.json")
+    }
 
-    def as_wanted(place: Path) -> bool:
+    def differing(place: Path) -> set[str]:
         found = contents(place)
-        same = all(found[name] == data for name, data in fixed.items() if name in found)
-        return found.keys() == ends[0].keys() and same
+        changed = {n for n, data in fixed.items() if n in found and found[n] != data}
+        return found.keys() ^ ends[0].keys() | changed
 
     tried: dict[str, int] = {}
     known: set[int] = set()
@@ -216,12 +216,12 @@ def sweep(
             if state in known:  # the next one cannot tell
                 continue
             known.add(state)
-            done = as_wanted(swept.place)
+            done = not differing(swept.place)
             code, told, _ = swept.run(go_on)
             assert code == 0 or done, f"{where}, then: {told}"  # some refuse what is done already
             # A lock that was left by who was killed is taken over by who next needs it.
             assert code or all(name.endswith(LOCK_NAME) for name in hidden(swept.place)), where
-            assert as_wanted(swept.place), where
+            assert not differing(swept.place), where
     return tried
 
 
