@@ -107,8 +107,8 @@ class Staged:
         _check_conditions(folder, known, self.recordings)
         _remove_unfinished(folder)
         names = _new_names(folder, known, self.files)
-        write_text(folder / UNFINISHED_NAME, "\n".join(names) + "\n")
         try:
+            write_text(folder / UNFINISHED_NAME, "\n".join(names) + "\n")
             for file, name in zip(self.files, names, strict=True):
                 file.rename(folder / name)
             sync_folder(folder)

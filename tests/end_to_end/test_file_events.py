@@ -222,8 +222,8 @@ def sweep(
             done = not differing(swept.place)
             code, told, _ = swept.run(go_on)
             assert code == 0 or done, f"{where}, then: {told}"  # some refuse what is done already
-            # A lock that was left by who was killed is taken over by who next needs it, and what was
-            # not finished is cleared by who next writes there.
+            # A lock that was left by who was killed is taken over by who next needs it, and what
+            # was not finished is cleared by who next writes there.
             left = [name for name in hidden(swept.place) if not name.endswith(LOCK_NAME)]
             assert done or not left, where
             assert not differing(swept.place), where
