@@ -146,15 +146,8 @@ def run_session(
         # Enrolled only if the session may begin.
         with enrolling as person:
             plan = draw_session(study, task, subject=subject, session=session, slot=person.slot)
-            manifest = SessionManifest(
-                **stated,
-                subject=subject,
-                session=session,
-                slot=person.slot,
-                code=person.code,
-                after={} if person.after is None else asdict(person.after),
-                trials=tuple(trial.to_dict() for trial in plan.trials),
-            )
+            after = {} if person.after is None else asdict(person.after)
+            manifest = _manifest(plan, stated, code=person.code, after=after)
             opened = SessionStore.resume if said.resume else SessionStore.create
             store = opened(root, manifest, overrides=overrides, texts=said.texts)
         with _sealed(store, root):
@@ -211,14 +204,8 @@ def require_ready(
         subject, study.plan_of(task.name).participants, simulated=simulated
     )
     plan = draw_session(study, task, subject=subject, session=session, slot=slot)
-    manifest = SessionManifest(
-        **_stated(study, task, models=models, rig=rig, simulated=simulated, said=said),
-        subject=subject,
-        session=session,
-        slot=slot,
-        code="",
-        trials=tuple(trial.to_dict() for trial in plan.trials),
-    )
+    stated = _stated(study, task, models=models, rig=rig, simulated=simulated, said=said)
+    manifest = _manifest(plan, stated, code="", after=None)
     in_force = require_openable(data_folder, manifest, overrides=overrides, resume=said.resume)
     _stored_plan(plan, task, stored=in_force, models=models)
 
@@ -285,6 +272,20 @@ def _stated(
         "description": task.description,
         **program_facts(),
     }
+
+
+def _manifest(
+    plan: SessionPlan, stated: Mapping[str, Any], *, code: str, after: Mapping[str, str] | None
+) -> SessionManifest:
+    return SessionManifest(
+        **stated,
+        subject=plan.subject,
+        session=plan.session,
+        slot=plan.slot,
+        code=code,
+        after=after,
+        trials=tuple(trial.to_dict() for trial in plan.trials),
+    )
 
 
 def _require_texts(study: Study, texts: TextsByLanguage) -> None:
