@@ -12,7 +12,7 @@ import re
 import shutil
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from functools import partial
 from io import StringIO
@@ -43,6 +43,7 @@ from tests.interrupting import Interrupter, forked
 __all__ = ["here"]
 
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
+NAMES = tuple(number.name for number in SIGNALS)
 MOST_HIDDEN = 6  # of the calls in a hidden folder
 SAMPLE = 4  # in make test, of each signal
 # What is already tried by another command of the same kind, but for what it reads, or as a session.
@@ -203,31 +204,36 @@ def sweep(
         changed = {n for n, data in fixed.items() if n in found and found[n] != data}
         return found.keys() ^ ends[0].keys() | changed
 
-    tried: dict[str, int] = {}
     known: set[int] = set()
-    for number in SIGNALS:
-        chosen = moments(calls)
-        for at in chosen if most is None else evenly(chosen, most):
+    chosen = moments(calls) if most is None else evenly(moments(calls), most)
+    for number, where, code, told in ended(swept, calls, chosen):
+        assert code in (0, -number, 128 + number), f"{where}: {told}"
+        if number != signal.SIGKILL:
+            assert not hidden(swept.place), where
+        state = state_of(swept.place)
+        if state in known:  # the next one cannot tell
+            continue
+        known.add(state)
+        done = not differing(swept.place)
+        code, told, _ = swept.run(go_on)
+        assert code == 0 or done, f"{where}, then: {told}"  # some refuse what is done already
+        # A lock that was left by who was killed is taken over by who next needs it, and what was
+        # not finished is cleared by who next writes there.
+        left = [name for name in hidden(swept.place) if not name.endswith(LOCK_NAME)]
+        assert done or not left, where
+        assert not differing(swept.place), where
+    return dict.fromkeys(NAMES, len(chosen))
+
+
+def ended(
+    swept: Swept, calls: Sequence[str], places: Sequence[int]
+) -> Iterator[tuple[int, str, int, str]]:
+    """A run ended by each signal after each call: signal, where, exit code, what was told."""
+    for number, name in zip(SIGNALS, NAMES, strict=True):
+        for at in places:
             swept.restore()
             code, told, _ = swept.run(at=at, number=number)
-            where = f"{signal.Signals(number).name} after {at} of {len(calls)}: {calls[at - 1]}"
-            assert code in (0, -number, 128 + number), f"{where}: {told}"
-            if number != signal.SIGKILL:
-                assert not hidden(swept.place), where
-            tried[signal.Signals(number).name] = tried.get(signal.Signals(number).name, 0) + 1
-            state = state_of(swept.place)
-            if state in known:  # the next one cannot tell
-                continue
-            known.add(state)
-            done = not differing(swept.place)
-            code, told, _ = swept.run(go_on)
-            assert code == 0 or done, f"{where}, then: {told}"  # some refuse what is done already
-            # A lock that was left by who was killed is taken over by who next needs it, and what
-            # was not finished is cleared by who next writes there.
-            left = [name for name in hidden(swept.place) if not name.endswith(LOCK_NAME)]
-            assert done or not left, where
-            assert not differing(swept.place), where
-    return tried
+            yield number, f"{name} after {at} of {len(calls)}: {calls[at - 1]}", code, told
 
 
 def state_of(place: Path) -> int:
@@ -343,19 +349,13 @@ def sweep_session(tmp_path: Path, *, resume: bool, most: int | None = None) -> d
     swept.restore()
     code, told, calls = swept.run()
     assert code == 0, told
-    tried: dict[str, int] = {}
-    for number in SIGNALS:
-        # Most of what can go wrong does while it opens.
-        last = len(calls) if most is None else opening(calls)
-        places = list(range(1, last + 1))
-        for at in places if most is None else evenly(places, most):
-            swept.restore()
-            swept.run(at=at, number=number)
-            code, told, _ = swept.run(go_on_with_the_session)
-            where = f"{signal.Signals(number).name} after {at} of {len(calls)}: {calls[at - 1]}"
-            assert code == 0, f"{where}, then: {told}"
-            tried[signal.Signals(number).name] = tried.get(signal.Signals(number).name, 0) + 1
-    return tried
+    # Most of what can go wrong does while it opens.
+    places = range(1, (len(calls) if most is None else opening(calls)) + 1)
+    chosen = places if most is None else evenly(places, most)
+    for _, where, _, _ in ended(swept, calls, chosen):
+        code, told, _ = swept.run(go_on_with_the_session)
+        assert code == 0, f"{where}, then: {told}"
+    return dict.fromkeys(NAMES, len(chosen))
 
 
 @pytest.mark.parametrize("resume", [False, True])
