@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from tactileq.interruption import Interrupted, ended_by_signals
+from tactileq.options import Command
 from tactileq.printing import print_warning, sentence_of
 from tactileq.workers import collect_less_often
 
@@ -76,7 +77,7 @@ for name, module in COMMANDS.items():
     if isinstance(command, typer.Typer):
         app.add_typer(command, name=name)
     else:
-        app.command(name)(command)
+        app.command(name, cls=Command)(command)
 
 
 def main() -> None:

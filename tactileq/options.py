@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
+from typer.core import TyperCommand
 
 Out = Annotated[Path, typer.Option("--out", help="Folder or file for the results.")]
 Seed = Annotated[int, typer.Option(min=0, max=2**31, help="Seed of all random numbers.")]
@@ -69,3 +70,17 @@ AssumedForce = Annotated[
     float | None,
     typer.Option("--force", help="Assumed force in N, where the device measures none."),
 ]
+
+
+# What stands for two words after an option, which typer alone does not take repeatedly.
+PAIR = "COLUMN VALUE"
+
+
+class Command(TyperCommand):
+    """A command whose options of metavar `PAIR` take two words each time."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        for param in self.params:
+            if param.metavar == PAIR:
+                param.nargs = 2

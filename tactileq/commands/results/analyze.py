@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tactileq.options import Out, Seed
+from tactileq.options import PAIR, Out, Seed
 from tactileq.printing import progress, share_of, usable_recordings
 from tactileq.results import FolderResults
 from tactileq.workers import working
@@ -38,8 +38,28 @@ def analyze(
         typer.Option(help="Instead of the folder: tables of any experiment, CSV or TSV."),
     ] = None,
     columns: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--map",
+            help="Meaning of the columns: correct=TYPE_ANS,factor=TYPE,…, or a TOML file with "
+            "these; repeatable.",
+        ),
+    ] = None,
+    where: Annotated[
+        list[Any] | None,
+        typer.Option(
+            parser=str,
+            metavar=PAIR,
+            help="Only lines of tables with this value in this column; repeatable.",
+        ),
+    ] = None,
+    right: Annotated[
         str | None,
-        typer.Option("--map", help="Meaning of the columns: correct=TYPE_ANS,factor=TYPE,…"),
+        typer.Option(
+            metavar="CODE",
+            help="What means right in the column correct; without right answers, whose share of "
+            "the column answered.",
+        ),
     ] = None,
     out: Out = Path("analysis-results"),
     recordings: Annotated[
@@ -96,23 +116,28 @@ def analyze(
     wrote.
 
     With --table, answers come from tables of any experiment. The map names columns: participant
-    (by default the file's name), factor (any number), count, and one of correct (0 or 1), share (0
-    to 1), value, or presented with answered. Without these, each file is a confusion matrix called
+    (by default the file's name), factor (any number; session where each file is one), count, and
+    one of correct (0 or 1, true or false, or --right), share (0 to 1), value, presented with
+    answered, or answered alone. Without these, each file is a confusion matrix called
     PARTICIPANT_LEVEL, with a level for each factor.
 
     Example: tactileq analyze --table P*.csv --map correct=RIGHT,factor=SIZE
 
+    Example: tactileq analyze --table export.csv --map roles.toml --where phase main --right 1
+
     Example: tactileq analyze data --recordings recordings --models models --simplified simplified
     """
     folders = (recordings, models, simplified)
-    if table is not None or columns is not None:
+    if table or columns or where or right is not None:
         if (*folders, plan, exclude, validate, unverified) != (None,) * 7 or complete:
             raise ValueError(
-                "expected --table with no option but --map, --out and --seed, got more; "
-                "leave the others out."
+                "expected --table with no option but --map, --where, --right, --out and --seed, "
+                "got more; leave the others out."
             )
         files = [*(table or []), *map(Path, data or [])]
-        analyze_tables(files, columns or "", out=out, seed=seed)
+        analyze_tables(
+            files, columns or (), where=where or (), right=right or "", out=out, seed=seed
+        )
         return
     if not data:
         raise ValueError(
@@ -179,23 +204,36 @@ def analyze(
     print((out / "report.html").resolve())
 
 
-def analyze_tables(files: Sequence[Path], columns: str, *, out: Path, seed: int) -> None:
+def analyze_tables(
+    files: Sequence[Path],
+    columns: Sequence[str],
+    *,
+    where: Sequence[tuple[str, str]],
+    right: str,
+    out: Path,
+    seed: int,
+) -> None:
     """Write the report on tables of any experiment."""
     import numpy as np
 
     from tactileq.analysis.answers.imported import load_imported, parse_map
     from tactileq.analysis.chapters.tables.section import table_sections
     from tactileq.analysis.report.report import write_report
+    from tactileq.modeling.files.others.roles import is_file_of_roles
 
     folders = [path for path in files if path.is_dir()]
     if not files or folders:
         got = f"the folder {folders[0]}" if folders else "none"
         raise ValueError(f"expected files of answers with --table, got {got}; give files only.")
     written = FolderResults(out, "analyze")
-    written.reads(*files)
-    imported = load_imported(files, parse_map(columns))
+    written.reads(*files, *map(Path, filter(is_file_of_roles, columns)))
+    mapping = parse_map(columns, where=where, right=right)
+    imported = load_imported(files, mapping)
     sections = table_sections(imported, rng=np.random.default_rng(seed))
-    provenance = written.provenance({"map": columns}, seed=seed)
+    settings = {"map": asdict(mapping), "notes": imported.notes}
+    provenance = written.provenance(settings, seed=seed)
+    for note in imported.notes:
+        print(f"note: {note}", file=sys.stderr)
     with written.folder(provenance) as fresh, share_of("Reporting") as advance:
         write_report(
             fresh / "report.html",

@@ -24,7 +24,7 @@ def test_a_table_of_a_spreadsheet(tmp_path: Path) -> None:
     text = "\r\n".join((*lines, "1;gross;4", ";;", "", ""))
     found = load(tmp_path, text, "participant=vp,value=rating,factor=Size")
     assert list(found.answers["participant_id"]) == ["1", "1"]
-    assert list(found.answers["Size"]) == ["klein", "gross"]
+    assert list(found.answers["Size"]) == ["klein", "GROSS"]
     assert list(found.answers["value"]) == [3.5, 4.0]
     assert (found.missed, found.measure) == (2, "value")
 
@@ -88,10 +88,10 @@ def test_a_matrix_has_its_condition_in_its_name(tmp_path: Path) -> None:
             ["3 to 16", "P01.csv"],
             17,
         ),
-        ("A,B\n1,1,1\n", "correct=A", ["2 columns", "line 2"], 3),
+        ("A,B\n1,1,1\n", "correct=A", ["2 cells", "line 2"], 3),
         ("A\nNaN\n", "correct=A", "answers", "none"),
-        ("A\n", "correct=A", "P01.csv", "1 lines"),
-        (b"A\n\xff\n", "correct=A", "P01.csv", "UTF-8"),
+        ("A\n", "correct=A", "P01.csv", "1 line"),
+        (b"A,F\n1,\xff\n", "correct=A,factor=F", ["UTF-8", "line 2"], "code pages"),
         ("x,a,b,c\na,1,1,1\nb,1,1,1\nd,1,1,1\n", "", "classes", ["a, b, c", "a, b, d"]),
         ("x,a,b\na,1,1\nb,1,1\n", "", ["3 to 16", "P01.csv"], 2),
         ("x,a,b,c\na,1,1,1\nb,1,1,1\nc,1,1,1\n", "factor=model", "PARTICIPANT_model", "P01"),

@@ -1,0 +1,478 @@
+"""A table that another program made: where its header is, what is a row, what a column holds.
+
+Nothing is taken that could have been meant otherwise: header, separator and decimal sign are
+decided for the whole file by what fits all its lines, and what two readings fit is refused with
+both. Only columns that are asked for have to be sound. docs/method/tables.md#dialects
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import groupby, zip_longest
+from pathlib import Path
+from statistics import mode
+
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import InputError, counted, shortened, shown
+from tactileq.modeling.files.others.numbers import NO_NUMBER, Numbers, Style, converted, is_number
+from tactileq.modeling.files.others.splitting import (
+    SEPARATORS,
+    Line,
+    Text,
+    check_spans,
+    read_other_text,
+    split,
+)
+
+MOST_NAMES = 200  # characters of the names of columns that a refusal lists
+_SAMPLED = 200  # lines of numbers by which columns of numbers are found
+_IMPORT_ID = '{"importid"'  # Qualtrics' third line; its second one holds the questions' texts
+
+
+def same_name(name: str) -> str:
+    """What two spellings of a column's name have in common: letters' case, width, composition."""
+    return unicodedata.normalize("NFKC", name).casefold().strip()
+
+
+@dataclass(frozen=True, eq=False)
+class OtherTable:
+    """Lines of a table by its header.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the columns, blank where the header is.
+    lines : list of Line
+        Below the header, each with a cell per column.
+    above : tuple of Line
+        Between the line of names and the numbers: units.
+    left_out : mapping of str to list of int
+        Numbers of lines that are no rows, by what they are.
+    trailing : list of str
+        First cells of lines that have a blank cell more than the header; empty where none is open.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    lines: list[Line]
+    separator: str
+    text: Text
+    header_line: int
+    above: tuple[Line, ...] = ()
+    left_out: Mapping[str, list[int]] | None = None
+    has_open_row_names: bool = False
+
+    def where(self, line: Line) -> str:
+        """Place of a line, for messages."""
+        return f"{self.path}, line {line.number}"
+
+    def place(self, name: str) -> int:
+        """Index of a column: by its name, by its number (#3), or by its name spelt otherwise.
+
+        Raises
+        ------
+        InputError
+            If there is no such column, or more than one; or if it is open which columns the cells
+            belong to.
+        """
+        if (number := number_of(name)) is not None and name not in self.names:
+            if number > len(self.names):
+                raise InputError(
+                    f"expected a column {name} in {self.path}, got {len(self.names)} columns; "
+                    "correct the map."
+                )
+            return number - 1
+        same = [i for i, own in enumerate(self.names) if own == name]
+        same = same or [i for i, own in enumerate(self.names) if same_name(own) == same_name(name)]
+        if len(same) != 1:
+            what = f"{len(same)} columns of that name" if same else "no such column"
+            there = shortened(", ".join(filter(None, self.names)), longest=MOST_NAMES)
+            raise InputError(
+                f"expected one column {shown(name)} in {self.path}, line {self.header_line}, got "
+                f"{what}; there are {there or 'none'}."
+            )
+        return same[0]
+
+    def cells(self, name: str) -> list[str]:
+        """Cells of a column, from top to bottom."""
+        place = self.place(name)
+        self._check_row_names(place)
+        return [line.cells[place] for line in self.lines]
+
+    def _check_row_names(self, place: int) -> None:
+        if self.has_open_row_names and place < len(self.names) - 1:
+            first = self.lines[0]
+            raise InputError(
+                f"expected as many cells as names in {self.where(first)}, got one more: either "
+                f"{shown(first.cells[0])} is the name of the row, as R writes it, or the line ends "
+                "with a separator too many; name all columns in the first line."
+            )
+
+    def numbers(self, columns: Sequence[str]) -> Style:
+        """How the numbers of some columns are written.
+
+        Raises
+        ------
+        InputError
+            If two ways fit and give other numbers.
+        """
+        seen = Numbers({name: self.cells(name) for name in columns}, separator=self.separator)
+        if seen.open_cell:
+            seen.within(self._of_others)
+        return seen.style(self.path)
+
+    @cached_property
+    def _of_others(self) -> Numbers:
+        """Numbers in all columns that hold nothing else, and are written in one way only."""
+        every = list(range(len(self.names)))
+        columns = {str(i): [line.cells[i] for line in self.lines] for i in every}
+        alone = {
+            name: cells
+            for name, cells in columns.items()
+            if any("." in c or "," in c for c in cells)
+            and all(is_number(c) or c.casefold() in NO_NUMBER for c in cells)
+            and not Numbers({name: cells}, separator=self.separator).open_cell
+        }
+        return Numbers(alone, separator=self.separator)
+
+    def floats(self, name: str, style: Style, *, what: str = "a number") -> Floats:
+        """The numbers of a column (n,), NaN where they are missing.
+
+        Raises
+        ------
+        InputError
+            For a cell that is no number, with its line.
+        """
+        cells = self.cells(name)
+        values, wrong = converted(cells, style)
+        if wrong >= 0:
+            raise InputError(
+                f"expected {what} in column {shown(name)} of {self.where(self.lines[wrong])}, got "
+                f"{shown(cells[wrong])}; correct that cell."
+            )
+        return values
+
+    def text_of(self, cell: str, line: Line) -> str:
+        """A cell that is taken as a name; refused where its letters are not certain."""
+        if not self.text.is_certain and not cell.isascii():
+            other = cell.encode("cp1252", "replace").decode("mac-roman", "replace")
+            raise InputError(
+                f"expected names in UTF-8 in {self.where(line)}, got bytes that are "
+                f"{shown(cell)} or, in other code pages, {shown(other)}; save the file as UTF-8."
+            )
+        return cell
+
+
+def number_of(name: str) -> int | None:
+    """The number of a column that is named by it, as in #3."""
+    digits = name[1:] if name.startswith("#") else ""
+    return int(digits) if digits.isdecimal() and int(digits) > 0 else None
+
+
+# --- Tables of answers -----------------------------------------------------------------------
+
+
+def read_other_table(path: Path, what: str, *, wanted: Sequence[str] = ()) -> OtherTable:
+    """A table of answers: its header is the first line that has all wanted names.
+
+    Parameters
+    ----------
+    what : str
+        What the file is, with its article, for messages.
+    wanted : sequence of str
+        Columns by name, or by number (#3): then a first line that is like those below it is one of
+        them, and the table has no header.
+
+    Raises
+    ------
+    InputError
+        If the file is no table, has several readings, or is damaged.
+    """
+    text = read_other_text(path, what)
+    named = [name for name in wanted if number_of(name) is None]
+
+    def header_in(lines: Sequence[Line]) -> int | None:
+        goal = set(map(same_name, named))
+        for place, line in enumerate(lines):
+            if goal <= set(map(same_name, line.cells)):
+                return place
+        return None
+
+    parsed = _parsed(text, path, header_in)
+    lines, header = parsed.lines, parsed.header
+    if not named and wanted and lines and not _is_header(lines, wanted):
+        width = mode(line.width for line in lines)
+        first = Line(lines[0].number, [f"#{i}" for i in range(1, width + 1)])
+        lines, header = [first, *lines], 0
+    if len(lines) - header < 2:
+        raise InputError(
+            f"expected a line of names and lines of answers in {path}, got "
+            f"{counted(len(lines), 'line')}; give a file with answers."
+        )
+    table = _table(path, text, parsed.separator, lines, header=header)
+    above = [line.number for line in lines[:header]]
+    return replace(table, left_out={"stand above the header": above, **(table.left_out or {})})
+
+
+def _is_header(lines: Sequence[Line], wanted: Sequence[str]) -> bool:
+    """Whether the first line names columns: its cells are no numbers and do not occur again."""
+    for name in wanted:
+        place = int(name[1:]) - 1
+        first, *below = [line.cells[place] for line in lines if place < len(line.cells)]
+        if is_number(first) or first in below:
+            return False
+    return True
+
+
+@dataclass(frozen=True)
+class _Parsed:
+    """The lines by one separator, and which of them has the names."""
+
+    separator: str
+    lines: list[Line]
+    header: int = 0
+    has_names: bool = False
+
+    @property
+    def is_even(self) -> bool:
+        """Whether every line fits the header, which has several cells, or one where all have."""
+        most = max((line.width for line in self.lines[self.header :]), default=0)
+        row_names = self.separator in "\t " and self._are_wider
+        return most <= self.width + row_names and (self.width > 1 or most == 1)
+
+    @property
+    def width(self) -> int:
+        """Number of cells of the header."""
+        return len(self.lines[self.header].cells) if self.lines else 0
+
+    @property
+    def _are_wider(self) -> bool:
+        below = self.lines[self.header + 1 :]
+        return bool(below) and all(len(line.cells) == self.width + 1 for line in below)
+
+    @property
+    def share(self) -> float:
+        """Share of the lines that fit the header, and more for several columns."""
+        if not self.lines:
+            return -1.0
+        fits = sum(line.width <= self.width for line in self.lines) / len(self.lines)
+        return fits + (self.width > 1)
+
+
+def _parsed(
+    text: Text, path: Path, header_in: Callable[[Sequence[Line]], int | None], **options: bool
+) -> _Parsed:
+    """The lines by the separator that fits; refused where two do."""
+    found: list[_Parsed] = []
+    refusal: InputError | None = None
+    first = next((line for line in text.content.split("\n") if line.strip()), "")
+    separators = [text.separator] if text.separator else list(SEPARATORS)
+    for separator in sorted(separators, key=first.count, reverse=True):
+        if separator not in text.content and found:
+            continue
+        if separator == " " and any(one.width > 1 for one in found):
+            continue  # blanks stand in texts, too
+        try:
+            lines = split(text, separator, path, **options)
+        except InputError as error:
+            refusal = refusal or (error if separator != " " else None)
+            continue
+        header = header_in(lines)
+        found.append(_Parsed(separator, lines, header or 0, header is not None))
+    return _the_one(found, refusal, path)
+
+
+def _the_one(found: Sequence[_Parsed], refusal: InputError | None, path: Path) -> _Parsed:
+    named = [one for one in found if one.has_names]
+    several = [one for one in named or found if one.is_even and one.lines]
+    wide = [one for one in several if one.width > 1] or several[:1]
+    if len(wide) > 1:
+        kinds = " or ".join(SEPARATORS[one.separator] for one in wide)
+        raise InputError(
+            f"expected one separator in {path}, got lines that fit {kinds}; save it as CSV with "
+            "cells in quotes."
+        )
+    # A quote that is damaged by the separator of the header is told, not read by another one.
+    if refusal and not (wide and wide[0].has_names and wide[0].width > 1):
+        raise refusal
+    return wide[0] if wide else max(named or found, key=lambda one: one.share)
+
+
+def _table(
+    path: Path, text: Text, separator: str, lines: Sequence[Line], *, header: int
+) -> OtherTable:
+    """The table below a header, its lines as wide as this; what is no row is left out."""
+    names, below = lines[header].cells, list(lines[header + 1 :])
+    left_out: dict[str, list[int]] = {}
+    if len(below) > 1 and any(c.casefold().startswith(_IMPORT_ID) for c in below[1].cells):
+        left_out["explain columns (Qualtrics)"] = [line.number for line in below[:2]]
+        below = below[2:]
+    again = [line.number for line in below if line.cells == names]
+    if again:
+        left_out["repeat the header"] = again
+        below = [line for line in below if line.cells != names]
+    check_spans(below, len(names), path)
+    with_row_names = bool(below) and all(len(line.cells) == len(names) + 1 for line in below)
+    is_open = False
+    if with_row_names:
+        first = [line.cells[0] for line in below]
+        if not any(line.cells[-1] for line in below):
+            is_open = len(set(first)) == len(first) and separator in "\t "
+        elif separator in "\t " and len(set(first)) == len(first):
+            names = ["", *names]
+            left_out["begin with the name of their row, which has no column"] = []
+    full = [_full_line(line, len(names), path) for line in below]
+    return OtherTable(
+        path,
+        tuple(names),
+        full,
+        separator,
+        text,
+        lines[header].number,
+        left_out=left_out,
+        has_open_row_names=is_open,
+    )
+
+
+def _full_line(line: Line, width: int, path: Path) -> Line:
+    """The line with as many cells as the header; spreadsheets add and drop empty ones."""
+    if line.width > width:
+        raise InputError(
+            f"expected {counted(width, 'cell')} in {path}, line {line.number}, as its header has, "
+            f"got {line.width}; put cells that hold the separator in quotes, or name all columns."
+        )
+    cells = [*line.cells[:width], *[""] * (width - len(line.cells))]
+    return replace(line, cells=cells)
+
+
+# --- Tables of numbers -----------------------------------------------------------------------
+
+
+def read_number_table(
+    path: Path, what: str, *, wanted: Sequence[str] = (), is_unit: Callable[[str], bool]
+) -> OtherTable:
+    """A log of numbers: its header is above the longest run of rows of numbers.
+
+    Parameters
+    ----------
+    what : str
+        What the file is, with its article, for messages.
+    wanted : sequence of str
+        Columns by name, or by number (#3), which needs no header.
+    is_unit : callable
+        Whether a cell is a unit: a line of those between the names and the numbers belongs to them.
+
+    Raises
+    ------
+    InputError
+        If the file is no table, has several readings, or a row has another number of cells.
+    """
+    text = read_other_text(path, what)
+
+    def header_in(lines: Sequence[Line]) -> int | None:
+        run = _run_of_numbers(lines)
+        return None if run is None else max(run.start - 1, 0)
+
+    parsed = _parsed(text, path, header_in, comments=True)
+    lines, run = parsed.lines, _run_of_numbers(parsed.lines)
+    if run is None:
+        raise InputError(
+            f"expected a header and rows of numbers in {path.name}, got "
+            f"{counted(len(lines), 'line')} without rows of numbers; export or record it again."
+        )
+    _check_run(lines, run, path)
+    header, names = _names_above(lines[: run.start], wanted, is_unit=is_unit)
+    if not names:
+        if not any(map(number_of, wanted)):
+            raise InputError(
+                f"expected a header line in {path.name} (time,x,y,z), got numbers; add one, or "
+                "give columns by number, as in --map time=#1,z=#2."
+            )
+        names = [f"#{i}" for i in range(1, run.width + 1)]
+    first = Line(header.number if header else lines[run.start].number, names)
+    table = _table(path, text, parsed.separator, [first, *lines[run.start : run.stop]], header=0)
+    above = [line.number for line in lines[: run.start] if line.number < first.number]
+    below = [line.number for line in lines[run.stop :]]
+    left_out = {"stand above the header": above, "stand below the numbers": below}
+    return replace(table, left_out={**left_out, **(table.left_out or {})})
+
+
+@dataclass(frozen=True)
+class _Run:
+    """Rows of numbers: from `start` to before `stop`, their cells, and which hold numbers."""
+
+    start: int
+    stop: int
+    width: int
+    columns: tuple[int, ...]
+
+    def holds(self, line: Line) -> bool:
+        """Whether the columns of numbers hold numbers in this line, or nothing."""
+        if len(line.cells) != self.width:
+            return False
+        cells = [line.cells[i] for i in self.columns]
+        found = [is_number(cell) for cell in cells]
+        return any(found) and all(
+            number or cell.casefold() in NO_NUMBER for cell, number in zip(cells, found, strict=True)
+        )
+
+
+def _run_of_numbers(lines: Sequence[Line]) -> _Run | None:
+    """The longest run of lines of one width, from its first row of numbers to its last one."""
+    start = stop = 0
+    for width, group in groupby(enumerate(lines), key=lambda item: len(item[1].cells)):
+        places = [place for place, _ in group]
+        if len(places) > stop - start:
+            start, stop, most = places[0], places[-1] + 1, width
+    if stop == start:
+        return None
+    sample = lines[start + (stop - start) // 4 : stop]
+    sample = sample[:: max(1, len(sample) // _SAMPLED)]
+    columns = tuple(
+        i for i in range(most) if sum(is_number(line.cells[i]) for line in sample) > 0.9 * len(sample)
+    )
+    run = _Run(start, stop, most, columns)
+    if not columns:
+        return None
+    rows = [place for place in range(start, stop) if run.holds(lines[place])]
+    return replace(run, start=rows[0], stop=rows[-1] + 1) if rows else None
+
+
+def _check_run(lines: Sequence[Line], run: _Run, path: Path) -> None:
+    """Refuse numbers outside of the run: a damaged line splits what was one."""
+    for line in lines[run.stop :]:
+        if any(map(is_number, line.cells)):
+            raise _damaged(line, run, path)
+    for line in lines[: run.start]:
+        inside = [line.cells[i] for i in run.columns if i < len(line.cells)]
+        if len(inside) == len(run.columns) and all(map(is_number, inside)):
+            raise _damaged(line, run, path)
+
+
+def _damaged(line: Line, run: _Run, path: Path) -> InputError:
+    return InputError(
+        f"expected {counted(run.width, 'value')} in line {line.number} of {path.name}, got "
+        f"{len(line.cells)}; the file is truncated or damaged, export or record it again."
+    )
+
+
+def _names_above(
+    lines: Sequence[Line], wanted: Sequence[str], *, is_unit: Callable[[str], bool]
+) -> tuple[Line | None, list[str]]:
+    """The line of names above the numbers, its names with the units below it."""
+    named = {same_name(name) for name in wanted if number_of(name) is None}
+    if not lines:
+        return None, []
+    cells = [cell for cell in lines[-1].cells if cell]
+    units = lines[-1].cells if len(lines) > 1 and cells and all(map(is_unit, cells)) else []
+    above = lines[:-1] if units else lines
+    fits = [line for line in above if named <= set(map(same_name, line.cells))]
+    header = fits[-1] if named and fits else above[-1]
+    with_units = [
+        f"{name} ({unit.strip('()[] ')})" if unit else name
+        for name, unit in zip_longest(header.cells[: header.width], units, fillvalue="")
+    ]
+    return header, with_units
