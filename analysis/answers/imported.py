@@ -392,7 +392,7 @@ class _Rows:
         self._refuse_first(chosen & ~no_answer & (no_level | no_name), levels)
         missed = chosen & no_answer & ~no_trial
         self.found.missed += int(np.nansum(count[missed]))
-        places = [self._where(i) for i in np.flatnonzero(no_trial)]
+        places = [self._where(i) for i in np.flatnonzero(no_trial).tolist()]
         self.found.leave_out(f"have no answer{' and no level' * bool(levels)}", places)
         kept = chosen & ~no_answer & (self._whole(count, chosen & ~no_answer) > 0)
         columns = {role: np.array(cells, dtype=object)[kept] for role, cells in names.items()}
@@ -401,7 +401,7 @@ class _Rows:
         rows = rows.assign(**own) if len(rows) else rows
         if "presented" in rows:
             rows["correct"] = (rows["presented"] == rows["answered"]).astype(float)
-        where = [self._where(i, whole=True) for i in np.flatnonzero(kept)]
+        where = [self._where(i, whole=True) for i in np.flatnonzero(kept).tolist()]
         return rows.assign(
             count=count[kept].astype(int), from_file=str(self.table.path), line=where
         )
@@ -421,9 +421,7 @@ class _Rows:
         """Cells of the columns that hold names, by role or factor."""
         roles = {r: c for r, c in self.mapping.columns.items() if r in ("participant",)}
         roles |= {name: name for name in self.factors}
-        classes = {
-            r: c for r, c in self.mapping.columns.items() if r in ("presented", "answered")
-        }
+        classes = {r: c for r, c in self.mapping.columns.items() if r in ("presented", "answered")}
         names = {role: self.found.labels.of(self.table, [c], role)[0] for role, c in roles.items()}
         if classes:
             both = self.found.labels.of(self.table, list(classes.values()), "class")
@@ -450,7 +448,7 @@ class _Rows:
                     f"{self.table.path}, got none; there are {shown(there)}."
                 )
             chosen &= fits
-        places = [self._where(i) for i in np.flatnonzero(~chosen)]
+        places = [self._where(i) for i in np.flatnonzero(~chosen).tolist()]
         self.found.leave_out("do not fit --where", places)
         return chosen
 
@@ -470,11 +468,11 @@ class _Rows:
     def _refuse_doubtful(self, cells: Sequence[str]) -> None:
         """Refuse an answer that may be a name or mean that there is none."""
         presented = set(self._names.get("presented", ()))
-        for place in np.flatnonzero(self._chosen):
+        for place in np.flatnonzero(self._chosen).tolist():
             cell = cells[place]
             if cell.casefold() in NO_ANSWER and cell not in presented:
                 raise InputError(
-                    f"expected an answer in {self._where(int(place), whole=True)}, got "
+                    f"expected an answer in {self._where(place, whole=True)}, got "
                     f"{shown(cell)}, which is an answer of this name or a trial without one; leave "
                     "the cell empty, or choose another name."
                 )
@@ -500,7 +498,7 @@ class _Rows:
         cells = self.table.cells(self.mapping.correct)
         right = _key(self.mapping.right)
         out = np.full(len(self.table.lines), np.nan)
-        for place in np.flatnonzero(self._chosen):
+        for place in np.flatnonzero(self._chosen).tolist():
             cell = cells[place]
             key = _key(cell)
             if key in NO_NUMBER and (not right or key != right):
@@ -513,7 +511,7 @@ class _Rows:
             else:
                 raise InputError(
                     f"expected 0 or 1, or true or false, as correct in "
-                    f"{self._where(int(place), whole=True)}, got {shown(cell)}; name the code that "
+                    f"{self._where(place, whole=True)}, got {shown(cell)}; name the code that "
                     "is right with --right, or a column of shares as share=."
                 )
         return out
@@ -531,21 +529,21 @@ class _Rows:
         return np.nan_to_num(count)
 
     def _refuse_where(self, wrong: Mask, role: str, wanted: str) -> None:
-        for place in np.flatnonzero(wrong)[:1]:
+        for place in np.flatnonzero(wrong)[:1].tolist():
             cell = self.table.cells(self.mapping.columns[role])[place]
             advice = "divide per cent by 100" if role == "share" else "give the number of answers"
             raise InputError(
-                f"expected {wanted} in {self._where(int(place), whole=True)}, got "
+                f"expected {wanted} in {self._where(place, whole=True)}, got "
                 f"{shown(cell) if cell else 'none'}; {advice}."
             )
 
     def _refuse_first(self, wrong: Mask, levels: Sequence[str]) -> None:
-        for place in np.flatnonzero(wrong)[:1]:
+        for place in np.flatnonzero(wrong)[:1].tolist():
             roles = (*levels, "participant")
             role = next(r for r in roles if r in self._names and is_no_name(self._names[r][place]))
             raise InputError(
                 f"expected a value of {self.mapping.columns.get(role, role)} beside the answer in "
-                f"{self._where(int(place), whole=True)}, got none; fill it in, or choose the rows "
+                f"{self._where(place, whole=True)}, got none; fill it in, or choose the rows "
                 "that are trials with --where."
             )
 

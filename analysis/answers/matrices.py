@@ -20,7 +20,9 @@ from tactileq.modeling.files.others.table import OtherTable
 FEWEST_CLASSES, MOST_CLASSES = 3, 16
 Counts = npt.NDArray[np.int64]
 # As programs head sums of rows and columns (pandas, R, SPSS, spreadsheets).
-SUMS = frozenset({"all", "total", "totals", "sum", "sums", "gesamt", "summe", "σ", "∑", "合計", "計"})
+SUMS = frozenset(
+    {"all", "total", "totals", "sum", "sums", "gesamt", "summe", "σ", "∑", "合計", "計"}
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +89,7 @@ def _counts(table: OtherTable, columns: Sequence[int]) -> Counts:
             f"expected a whole count from 0 in {table.where(line)}, got "
             f"{shown(line.cells[columns[column]])}; give the number of answers."
         )
-    return values.astype(np.int64)
+    return np.asarray(values, dtype=np.int64)
 
 
 def _check_unnamed(table: OtherTable) -> None:

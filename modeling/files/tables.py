@@ -78,7 +78,6 @@ def read_table(
     columns: Sequence[Column],
     *,
     what: str = "a table",
-    delimiter: str = "\t",
     bids: bool = False,
     only: bool = False,
     advice: str = "correct it",
@@ -93,8 +92,6 @@ def read_table(
         An optional one that the table does not have is None in each row.
     what : str
         What the file is, for messages.
-    delimiter : str
-        A comma: of a CSV, in which cells may be quoted.
     bids : bool
         Cells may be quoted as in CSV, hold values as they are, and every line is a row; else they
         are `guarded`, and lines that are empty or begin with # are none.
@@ -116,7 +113,6 @@ def read_table(
             path,
             columns,
             what=what,
-            delimiter=delimiter,
             bids=bids,
             only=only,
             advice=advice,
@@ -141,7 +137,6 @@ def read_cells(
     columns: Sequence[Column],
     *,
     what: str = "a table",
-    delimiter: str = "\t",
     bids: bool = False,
     only: bool = False,
     advice: str = "correct it",
@@ -157,15 +152,14 @@ def read_cells(
         for number, line in enumerate(text.removesuffix("\n").split("\n"), start=1)
         if bids or (line.strip() and not line.startswith("#"))
     ]
-    split = csv_cells if bids or delimiter == "," else _plain_cells
-    split_lines = [(where, split(line, where, delimiter=delimiter)) for where, line in lines]
+    split_lines = [(w, csv_cells(line, w) if bids else line.split("\t")) for w, line in lines]
     header = split_lines[0][1] if split_lines else []
-    _check_header(header, columns, source, delimiter=delimiter, only=only)
+    check_header(header, columns, source, only=only)
     for where, cells in split_lines[1:]:
         if len(cells) != len(header):
             raise InputError(
                 f"expected {len(header)} cells in {where}, got {len(cells)}; {advice}, since the "
-                f"table is damaged or not separated by {_SEPARATORS[delimiter]}."
+                f"table is damaged or not separated by tabs."
             )
     value = str if bids else unguarded
     return [
@@ -174,29 +168,8 @@ def read_cells(
     ]
 
 
-def declared_text(path: Path, columns: Sequence[Column], *, delimiter: str = "\t") -> str:
-    """The declared columns of a table of numbers as they are, without comments and other columns.
-
-    Raises
-    ------
-    InputError
-        As `read_cells`.
-    """
-    rows = [cells for _, cells in read_cells(path, columns, delimiter=delimiter)]
-    known = [name for name in names(columns) if rows and name in rows[0]]
-    lines = [known, *([row[name] for name in known] for row in rows)]
-    return "".join(delimiter.join(line) + "\n" for line in lines)
-
-
-def _plain_cells(line: str, _: str, *, delimiter: str) -> list[str]:
-    return line.split(delimiter)
-
-
-_SEPARATORS = {"\t": "tabs", ",": "commas"}
-
-
-def _check_header(
-    header: Sequence[str], columns: Sequence[Column], source: Path, *, delimiter: str, only: bool
+def check_header(
+    header: Sequence[str], columns: Sequence[Column], source: Path, *, only: bool
 ) -> None:
     """Refuse columns that are missing, doubled, or not known: those would be ignored silently."""
     missing = [c.name for c in columns if c.name not in header and not c.optional]
@@ -206,7 +179,7 @@ def _check_header(
         raise InputError(
             f"expected the columns {needed} in {source}, got "
             f"{shortened(', '.join(header)) or 'an empty file'}; add {several} (separated by "
-            f"{_SEPARATORS[delimiter]})."
+            "tabs)."
         )
     for name in header:
         if header.count(name) > 1:
@@ -223,8 +196,8 @@ def _check_header(
             )
 
 
-def csv_cells(line: str, where: str, *, delimiter: str = ",") -> list[str]:
-    """The cells of one line of a CSV.
+def csv_cells(line: str, where: str) -> list[str]:
+    """The cells of one line that are separated by tabs and may be quoted.
 
     Line by line, since a quote that nobody closed would swallow all lines up to the next one.
 
@@ -239,9 +212,9 @@ def csv_cells(line: str, where: str, *, delimiter: str = ",") -> list[str]:
         For a quote that is not closed, or within a cell.
     """
     if '"' not in line:
-        return line.split(delimiter)
+        return line.split("\t")
     try:
-        return next(csv.reader([line], delimiter=delimiter, strict=True))
+        return next(csv.reader([line], delimiter="\t", strict=True))
     except csv.Error:
         raise InputError(
             f"expected quotes only around whole cells in {where}, got {shown(line)}; close or "

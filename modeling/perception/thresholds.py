@@ -19,8 +19,9 @@ from tactileq.modeling.errors import InputError, shown
 from tactileq.modeling.files.columns import ABOVE_0, Column, chosen
 from tactileq.modeling.files.described import FileSection, key
 from tactileq.modeling.files.hashes import sha256_of_values
+from tactileq.modeling.files.others.declared import read_user_cells
 from tactileq.modeling.files.reading import read_text
-from tactileq.modeling.files.tables import read_cells, typed
+from tactileq.modeling.files.tables import typed
 from tactileq.modeling.reprs import one_line
 
 STANDARD_GRAVITY_M_S2 = 9.80665
@@ -141,7 +142,7 @@ class Threshold(FileSection):
             For a missing file, missing or doubled columns or values that are no thresholds.
         """
         source = Path(path)
-        rows = read_cells(source, THRESHOLD_COLUMNS[:1])
+        rows = read_user_cells(source, THRESHOLD_COLUMNS, "a table of thresholds")
         columns = [name for name in LEVEL_COLUMNS if rows and name in rows[0][1]]
         if len(columns) != 1:
             got = "both" if columns else ("neither" if rows else "no rows")

@@ -11,7 +11,7 @@ import numpy as np
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import InputError, shown
 from tactileq.modeling.files.columns import Column, names
-from tactileq.modeling.files.tables import read_table
+from tactileq.modeling.files.others.declared import read_user_table
 from tactileq.modeling.hand import Hand
 
 LONGEST_S = 3600.0
@@ -126,7 +126,7 @@ def load_trajectory(path: str | Path, *, name: str) -> Trajectory:
     InputError
         For a missing file, missing columns, cells that are no numbers, or times that do not rise.
     """
-    rows = read_table(path, TRAJECTORY_COLUMNS, what="a trajectory (CSV)", delimiter=",")
+    rows = read_user_table(path, TRAJECTORY_COLUMNS, what="a trajectory (CSV)")
     time_s, speed_mm_s, force_n = (
         np.array([row[column] for row in rows], dtype=np.float64)
         for column in names(TRAJECTORY_COLUMNS)

@@ -7,7 +7,7 @@ import unicodedata
 from collections.abc import Sequence
 
 from tactileq.modeling.errors import shown
-from tactileq.modeling.files.others.numbers import Numbers, Style, is_number
+from tactileq.modeling.files.others.numbers import Style, fitting, is_number
 from tactileq.modeling.files.others.table import OtherTable
 
 # No name; every other word is one, such as none.
@@ -45,11 +45,14 @@ class Labels:
             For numbers of which two readings fit, and letters whose encoding is not certain.
         """
         raw = [table.cells(column) for column in columns]
-        seen = {c: [x for x in cells if not is_no_name(x)] for c, cells in zip(columns, raw)}
+        seen = {
+            c: [x for x in cells if not is_no_name(x)]
+            for c, cells in zip(columns, raw, strict=True)
+        }
+        every = [cell for cells in seen.values() for cell in cells]
         style = None
-        if any(seen.values()) and all(is_number(x) for cells in seen.values() for x in cells):
-            if Numbers(seen, separator=table.separator).styles:
-                style = table.numbers(columns)
+        if every and all(map(is_number, every)) and fitting(every, separator=table.separator):
+            style = table.numbers(columns)
         return [
             [
                 self(kind, table.text_of(_by_value(cell, style), line))

@@ -56,9 +56,7 @@ class Style(NamedTuple):
     def describe(self, cell: str) -> str:
         """What a cell is by this style, with the reason."""
         has_thousands = bool(self.thousands) and self.thousands in cell
-        why = (
-            "as thousands" if has_thousands else f"with a decimal {_SIGNS[self.decimal]}"
-        )
+        why = "as thousands" if has_thousands else f"with a decimal {_SIGNS[self.decimal]}"
         return f"{self.reading(cell)} {why}"
 
 

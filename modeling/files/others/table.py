@@ -8,7 +8,7 @@ both. Only columns that are asked for have to be sound. docs/method/tables.md#di
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby, zip_longest
@@ -175,7 +175,13 @@ def number_of(name: str) -> int | None:
 # --- Tables of answers -----------------------------------------------------------------------
 
 
-def read_other_table(path: Path, what: str, *, wanted: Sequence[str] = ()) -> OtherTable:
+def read_other_table(
+    path: Path,
+    what: str,
+    *,
+    wanted: Sequence[str] = (),
+    is_declared: bool = False,
+) -> OtherTable:
     """A table of answers: its header is the first line that has all wanted names.
 
     Parameters
@@ -185,6 +191,9 @@ def read_other_table(path: Path, what: str, *, wanted: Sequence[str] = ()) -> Ot
     wanted : sequence of str
         Columns by name, or by number (#3): then a first line that is like those below it is one of
         them, and the table has no header.
+    is_declared : bool
+        Whether the columns are declared: then a header alone is a table, lines that begin with #
+        are none, and each line has all cells.
 
     Raises
     ------
@@ -201,20 +210,31 @@ def read_other_table(path: Path, what: str, *, wanted: Sequence[str] = ()) -> Ot
                 return place
         return None
 
-    parsed = _parsed(text, path, header_in)
+    parsed = _parsed(text, path, header_in, comments=is_declared)
     lines, header = parsed.lines, parsed.header
     if not named and wanted and lines and not _is_header(lines, wanted):
         width = mode(line.width for line in lines)
         first = Line(lines[0].number, [f"#{i}" for i in range(1, width + 1)])
         lines, header = [first, *lines], 0
-    if len(lines) - header < 2:
+    if len(lines) - header < 2 - is_declared:
         raise InputError(
-            f"expected a line of names and lines of answers in {path}, got "
-            f"{counted(len(lines), 'line')}; give a file with answers."
+            f"expected {what} with a line of names and lines below it in {path}, got "
+            f"{counted(len(lines), 'line')}; give a file that is not empty."
         )
+    if is_declared:
+        _check_whole(lines[header:], path)
     table = _table(path, text, parsed.separator, lines, header=header)
     above = [line.number for line in lines[:header]]
     return replace(table, left_out={"stand above the header": above, **(table.left_out or {})})
+
+
+def _check_whole(lines: Sequence[Line], path: Path) -> None:
+    for line in lines[1:]:
+        if len(line.cells) != len(lines[0].cells):
+            raise InputError(
+                f"expected {counted(len(lines[0].cells), 'cell')} in line {line.number} of {path}, "
+                f"got {len(line.cells)}; correct it, since the table is damaged."
+            )
 
 
 def _is_header(lines: Sequence[Line], wanted: Sequence[str]) -> bool:
@@ -268,9 +288,9 @@ def _parsed(
     """The lines by the separator that fits; refused where two do."""
     found: list[_Parsed] = []
     refusal: InputError | None = None
-    first = next((line for line in text.content.split("\n") if line.strip()), "")
     separators = [text.separator] if text.separator else list(SEPARATORS)
-    for separator in sorted(separators, key=first.count, reverse=True):
+    often = text.content.count
+    for separator in sorted(separators, key=lambda one: (one == " ", -often(one))):
         if separator not in text.content and found:
             continue
         if separator == " " and any(one.width > 1 for one in found):
@@ -315,7 +335,7 @@ def _table(
         left_out["repeat the header"] = again
         below = [line for line in below if line.cells != names]
     check_spans(below, len(names), path)
-    with_row_names = bool(below) and all(len(line.cells) == len(names) + 1 for line in below)
+    with_row_names = len(below) > 1 and all(len(line.cells) == len(names) + 1 for line in below)
     is_open = False
     if with_row_names:
         first = [line.cells[0] for line in below]
@@ -416,7 +436,8 @@ class _Run:
         cells = [line.cells[i] for i in self.columns]
         found = [is_number(cell) for cell in cells]
         return any(found) and all(
-            number or cell.casefold() in NO_NUMBER for cell, number in zip(cells, found, strict=True)
+            number or cell.casefold() in NO_NUMBER
+            for cell, number in zip(cells, found, strict=True)
         )
 
 
@@ -432,7 +453,9 @@ def _run_of_numbers(lines: Sequence[Line]) -> _Run | None:
     sample = lines[start + (stop - start) // 4 : stop]
     sample = sample[:: max(1, len(sample) // _SAMPLED)]
     columns = tuple(
-        i for i in range(most) if sum(is_number(line.cells[i]) for line in sample) > 0.9 * len(sample)
+        i
+        for i in range(most)
+        if sum(is_number(line.cells[i]) for line in sample) > 0.9 * len(sample)
     )
     run = _Run(start, stop, most, columns)
     if not columns:

@@ -11,7 +11,7 @@ import numpy as np
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import InputError, shown
 from tactileq.modeling.files.columns import Column, names
-from tactileq.modeling.files.tables import read_table
+from tactileq.modeling.files.others.declared import read_user_table
 from tactileq.rig.devices.hand.sample import Sample
 from tactileq.rig.devices.hand.settings import SCRIPTS, HandSettings
 from tactileq.rig.devices.hand.tracking import REST_S
@@ -90,7 +90,7 @@ class ScriptedTrajectory:
     @classmethod
     def load(cls, path: str | Path) -> ScriptedTrajectory:
         """From a table with the columns time_s, x_mm, y_mm and force_n."""
-        rows = read_table(path, SCRIPT_COLUMNS)
+        rows = read_user_table(path, SCRIPT_COLUMNS, what="a table")
         time_s, x_mm, y_mm, force_n = (
             np.array([row[name] for row in rows], dtype=float) for name in names(SCRIPT_COLUMNS)
         )

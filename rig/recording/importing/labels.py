@@ -9,7 +9,8 @@ from typing import Any
 
 from tactileq.modeling import InputError
 from tactileq.modeling.files.columns import Column, chosen
-from tactileq.modeling.files.tables import read_cells, typed
+from tactileq.modeling.files.others.declared import read_user_cells
+from tactileq.modeling.files.tables import typed
 from tactileq.modeling.recordings.recording_set import KNOWN_COLUMNS
 
 LABEL_COLUMNS = (
@@ -53,7 +54,7 @@ def labels_from_table(
         usable numbers.
     """
     rows: dict[str, tuple[str, dict[str, str]]] = {}
-    for where, row in read_cells(table, LABEL_COLUMNS, only=True):
+    for where, row in read_user_cells(table, LABEL_COLUMNS, "labels", only=True):
         typed(row, LABEL_COLUMNS[:1], where)  # others may be filled in later
         if row["file"] in rows:
             raise InputError(

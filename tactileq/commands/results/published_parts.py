@@ -102,21 +102,21 @@ def _write_recipe(place: Path, target: Path) -> Iterator[Path]:
 
 
 def _hand(path: Path) -> bytes:
-    from tactileq.modeling.files.tables import declared_text
+    from tactileq.modeling.files.others.declared import declared_text
     from tactileq.modeling.recordings.trajectory import TRAJECTORY_COLUMNS
 
-    return declared_text(path, TRAJECTORY_COLUMNS, delimiter=",").encode()
+    return declared_text(path, TRAJECTORY_COLUMNS, what="a trajectory", separator=",").encode()
 
 
 def _threshold(path: Path) -> bytes:
     """With its source and its caveat, which are part of its hash."""
     from tactileq.modeling import Threshold
-    from tactileq.modeling.files.tables import declared_text
+    from tactileq.modeling.files.others.declared import declared_text
     from tactileq.modeling.perception.thresholds import THRESHOLD_COLUMNS
 
     stated = Threshold.load(path)
     notes = f"# source: {stated.source}\n# caveat: {stated.caveat}\n"
-    return (notes + declared_text(path, THRESHOLD_COLUMNS)).encode()
+    return (notes + declared_text(path, THRESHOLD_COLUMNS, what="thresholds")).encode()
 
 
 def _check_within(path: Path, folder: Path) -> None:

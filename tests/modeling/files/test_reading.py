@@ -93,8 +93,8 @@ def test_a_column_has_one_name(tmp_path: Path) -> None:
 
 
 def test_cells_and_quotes() -> None:
-    assert csv_cells("a,b,", "line 1") == ["a", "b", ""]
-    assert csv_cells('"a,""b""";c', "line 1", delimiter=";") == ['a,"b"', "c"]
+    assert csv_cells("a\tb\t", "line 1") == ["a", "b", ""]
+    assert csv_cells('"a,""b"""\tc', "line 1") == ['a,"b"', "c"]
     for line in ('a,"b', 'a,"b"c', '"' + "a" * 200_000):
         with refused(InputError, expected=["quotes", "line 7"], got=shown(line)) as caught:
             csv_cells(line, "line 7")
