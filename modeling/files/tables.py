@@ -178,8 +178,7 @@ def check_header(
         needed = ", ".join(c.name for c in columns if not c.optional)
         raise InputError(
             f"expected the columns {needed} in {source}, got "
-            f"{shortened(', '.join(header)) or 'an empty file'}; add {several} (separated by "
-            "tabs)."
+            f"{shortened(', '.join(header)) or 'an empty file'}; add {several}."
         )
     for name in header:
         if header.count(name) > 1:

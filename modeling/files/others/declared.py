@@ -39,9 +39,7 @@ def read_user_cells(
     needed = [column.name for column in columns if not column.optional]
     table = read_other_table(source, what, wanted=needed, is_declared=True)
     if not table.text.is_certain:
-        raise InputError(
-            f"expected {what} as text in {source}, got other bytes; save it as UTF-8."
-        )
+        raise InputError(f"expected {what} as text in {source}, got other bytes; save it as UTF-8.")
     check_header(table.names, columns, source, only=only)
     present = [name for name in names(columns) if name in table.names]
     numeric = [c.name for c in columns if c.limits is not None and c.name in present]
