@@ -18,15 +18,15 @@ from tactileq.modeling.errors import counted, shortened, shown
 from tactileq.modeling.files.columns import number_in
 from tactileq.modeling.files.reading import read_bytes
 from tactileq.modeling.files.tables import csv_cells
-from tactileq.rig.recording.importing.times import TimeColumn, since_first
+from tactileq.rig.recording.importing.headers import TIME_NAMES as _TIME_NAMES
+from tactileq.rig.recording.importing.headers import is_acceleration
+from tactileq.rig.recording.importing.headers import name_and_unit as _name_and_unit
+from tactileq.rig.recording.importing.headers import role as _role
+from tactileq.rig.recording.importing.times import TimeColumn, since_first, unwrapped
 
 Axis = Literal["x", "y", "z", "dft321"]
 ROLES = ("time", "x", "y", "z")
-_TIME_NAMES = {"time", "t", "timestamp"}
 _UNIT_ALONE = re.compile(r"\s*[\[(][^\])]*[\])]\s*")  # a line below the header: (ms),(V)
-_ELAPSED = re.compile(r"(?:elapsed_)?(milli|micro|nano)?seconds(?:_elapsed)?")  # seconds_elapsed
-_SECONDS = {None: "s", "milli": "ms", "micro": "us", "nano": "ns"}
-_AXIS_NAME = re.compile(r"(?:(?:a|.*acc.*?)_?)?([xyz])")  # x, ax, acc_x, linear_acceleration_x
 
 
 def parse_columns(text: str) -> dict[str, str]:
@@ -165,48 +165,28 @@ def _roles(path: Path, header: Sequence[str], named: Mapping[str, str]) -> list[
     return roles
 
 
-def _role(header: str) -> str | None:
-    """What a column is by its header alone: "time", an axis, or neither."""
-    name = _name_and_unit(header)[0]
-    if name in _TIME_NAMES:
-        return "time"
-    axis = _AXIS_NAME.fullmatch(name)
-    return axis[1] if axis else None
-
-
-def _name_and_unit(header: str) -> tuple[str, str]:
-    """`Acc X (m/s²)` → (acc_x, m/s2); `x_g` → (x, g); `seconds_elapsed` → (time, s)."""
-    text = header.lower().replace("²", "2").replace("^2", "2").replace("µ", "u").replace("s^-2", "")
-    unit = ""
-    if bracket := re.search(r"[\[(](.*?)[\])]", text):
-        unit = bracket.group(1).strip()
-        text = text[: bracket.start()]
-    elif suffix := re.fullmatch(r"(.+?)_(g|mg|m_s2|v|mv|s|ms|us|ns)", text.strip()):
-        text, unit = suffix.groups()
-    name = re.sub(r"[\s_]+", "_", text.strip()).strip("_")
-    if not unit and (elapsed := _ELAPSED.fullmatch(name)):
-        return "time", _SECONDS[elapsed[1]]
-    volts = {"v": "V", "volt": "V", "volts": "V", "mv": "mV"}
-    return name, volts.get(unit, unit.replace("m_s2", "m/s2"))
-
-
 def _times_in(columns: Mapping[str, Floats]) -> list[str]:
     return [name for name in columns if _role(name) == "time"]
 
 
 def time_column(path: Path, columns: Mapping[str, Floats]) -> TimeColumn | None:
-    """The first column of times that gives a rate, or else the first one, if there is any."""
+    """The first column of times that gives a rate, else in its longest part, else the first one."""
     every = [
-        TimeColumn(path.name, name, _name_and_unit(name)[1], columns[name])
+        TimeColumn(path.name, name, _name_and_unit(name)[1], unwrapped(columns[name]))
         for name in _times_in(columns)
     ]
-    return next((time for time in every if time.has_a_rate()), every[0] if every else None)
+    whole = [time for time in every if time.has_a_rate()]
+    in_part = [time for time in every if time.without_gaps(None)[1]]
+    return next(iter((*whole, *in_part, *every)), None)
 
 
 def chosen_axes(path: Path, columns: dict[str, Floats], axis: Axis | None) -> tuple[Floats, str]:
     """The chosen axis (1, n), or all three (3, n), as recorded, and the unit in their header."""
     times = _times_in(columns)
     others = [name for name in columns if name not in times]
+    accelerations = [name for name in others if is_acceleration(name)]
+    if len(accelerations) == 1 and not any(map(_role, {*others} - {*accelerations})):
+        others = accelerations if axis is None else others
     if axis is None and len(others) != 1:
         raise InputError(
             f"expected --axis x, y, z or dft321 for {path.name}, got none and the columns "
@@ -236,7 +216,7 @@ def only_axis_of(named: Mapping[str, str]) -> Axis | None:
 
 def _names_of_axes(path: Path, names: Sequence[str], axis: Axis) -> list[str]:
     """The columns of the axis, or of all three."""
-    letters = {n: m[1] for n in names if (m := _AXIS_NAME.fullmatch(_name_and_unit(n)[0]))}
+    letters = {name: letter for name in names if (letter := _role(name)) in ("x", "y", "z")}
     wanted = "xyz" if axis == "dft321" else axis
     chosen = [name for letter in wanted for name in letters if letters[name] == letter]
     if [letters[name] for name in chosen] != list(wanted):

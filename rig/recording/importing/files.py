@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from warnings import warn
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from tactileq.rig.recording.importing.csv_columns import (
     read_columns,
     time_column,
 )
+from tactileq.rig.recording.importing.headers import OVERLOAD, known_unit
 from tactileq.rig.recording.importing.labels import Label
 from tactileq.rig.recording.importing.plausible import G_PER_UNIT, doubts_about
 from tactileq.rig.recording.importing.times import TimeColumn
@@ -32,6 +34,7 @@ from tactileq.rig.recording.importing.times import TimeColumn
 # Below it layers are missed: docs/method/recordings.md#shortest-records
 SHORTEST_MODELLED_S = 0.2
 VOLTS_PER_UNIT = {"V": 1.0, "mV": 1e-3}
+_UNITS = (*G_PER_UNIT, *VOLTS_PER_UNIT)
 SENSITIVITIES_MV_PER_G = (0.01, 1e5)  # from shock sensors to seismic ones
 
 
@@ -121,8 +124,8 @@ def import_csv(
     axis : {"x", "y", "z", "dft321"}, optional
         Needed where a file has more than one column beside time, unless `named` names one axis.
     unit : {"g", "mg", "m/s2", "V", "mV", "arbitrary"}, optional
-        Unit of the axes, where the header names none (`x (g)`, `x_g`). With neither the unit is
-        `arbitrary`.
+        Unit of the axes, where the header names none (`x (g)`, `x_g`), or none that is known. With
+        neither the unit is `arbitrary`.
     rate_hz : float, optional
         If there is no time column, or one that gives no rate; must not contradict one that does.
     mv_per_g : float, optional
@@ -142,9 +145,11 @@ def import_csv(
 
 
 def _meant(one: Imported) -> Recording:
-    """The recording; refused where something about it is implausible."""
+    """The recording, with its warnings; refused where something about it is implausible."""
     if one.doubts:
         raise InputError(one.doubts[0])
+    for sentence in one.warnings:
+        warn(sentence, stacklevel=5)
     return one.recording
 
 
@@ -163,20 +168,18 @@ def import_csv_file(
         raise InputError(
             f"expected an axis among {', '.join(AXES)}, got {shown(axis)}; choose one."
         )
+    unit = unit and (known_unit(unit) or unit)
     _check_unit(unit, "--unit")
     columns, warnings = read_columns(path, named or {})
     time = time_column(path, columns)
     axes, found_unit = chosen_axes(path, columns, axis or only_axis_of(named or {}))
+    rows, gap = time.without_gaps(rate_hz) if time else (slice(None), "")
+    _check_overload(path, axes, rows)
+    axes, time = axes[:, rows], time and replace(time, values=time.values[rows])
     # Combined axes no longer show their limits, nor do resampled ones: they are looked for here.
     clipped_share = float(np.any([clipped_samples(one) for one in axes], axis=0).mean())
     rate_hz, axes, uneven, contradiction = _even(path, time, axes, columns, given_hz=rate_hz)
-    if unit and found_unit and unit != found_unit:
-        raise InputError(
-            f"expected one unit for {path.name}, got {shown(found_unit)} in its header and "
-            f"{shown(unit)} from --unit; leave --unit out or correct the header."
-        )
-    final_unit = unit or found_unit or "arbitrary"
-    _check_unit(final_unit, f"the header of {path.name}")
+    final_unit, other_unit = _unit(path, found_unit, given=unit)
     recording = _recording(
         path,
         (dft321(axes) if len(axes) == 3 else axes[0]) * _g_per(final_unit, mv_per_g, path.name),
@@ -188,7 +191,7 @@ def import_csv_file(
     taken_as = "g" if final_unit in VOLTS_PER_UNIT else final_unit
     return Imported(
         recording,
-        (*warnings, *uneven, *_too_short(path, recording)),
+        (*warnings, *filter(None, (gap, other_unit)), *uneven, *_too_short(path, recording)),
         doubts=(*contradiction, *doubts_about(recording, path.name, unit=taken_as)),
     )
 
@@ -234,7 +237,7 @@ def _even(
 ) -> tuple[float, Floats, Sequence[str], Sequence[str]]:
     """Rate and evenly spaced samples; warnings about them; contradictions to the rate.
 
-    A rate that is given says that the samples are even, whatever their times.
+    A rate that is given says that the samples between gaps are even, whatever their times.
     """
     if time is None:
         if given_hz is None:
@@ -264,6 +267,36 @@ def _even(
         "into noise, and less at lower frequencies."
     )
     return given_hz, axes, (note,), ()
+
+
+def _check_overload(path: Path, axes: Floats, rows: slice) -> None:
+    """Refuse what instruments send for a value beyond their range."""
+    over = np.flatnonzero((np.abs(axes[:, rows]) >= OVERLOAD).any(axis=0))
+    if over.size:
+        row = int(over[0]) + (rows.start or 0)
+        raise InputError(
+            f"expected samples within the range of the instrument in {path.name}, got its sign for "
+            f"an overload, {np.abs(axes[:, row]).max():.3g}, in row {row + 1} of the numbers; "
+            "record again with a wider range."
+        )
+
+
+def _unit(path: Path, found: str, *, given: str | None) -> tuple[str, str]:
+    """The unit of the samples, and a warning where the header names one that is not known."""
+    if not given:
+        _check_unit(found or None, f"the header of {path.name}")
+        return found or "arbitrary", ""
+    if found in _UNITS and found != given:
+        raise InputError(
+            f"expected one unit for {path.name}, got {shown(found)} in its header and "
+            f"{shown(given)} from --unit; leave --unit out or correct the header."
+        )
+    if found in ("", given):
+        return given, ""
+    return given, (
+        f"{path.name}: its header names the unit {shown(found)}, which is not known; its numbers "
+        f"are taken in {given}, as --unit says."
+    )
 
 
 def _g_per(unit: str, mv_per_g: float | None, file: str) -> float:
@@ -332,8 +365,8 @@ def _recording(
 
 
 def _check_unit(unit: str | None, where: str) -> None:
-    if unit is not None and unit not in (*G_PER_UNIT, *VOLTS_PER_UNIT):
+    if unit is not None and unit not in _UNITS:
         raise InputError(
-            f"expected a unit among {', '.join((*G_PER_UNIT, *VOLTS_PER_UNIT))} in {where}, got "
+            f"expected a unit among {', '.join(_UNITS)} in {where}, got "
             f"{shown(unit)}; convert the data or name the unit with --unit."
         )

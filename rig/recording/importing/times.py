@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactileq.modeling import InputError
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.checks import HIGHEST_RATE_HZ, LARGEST_VALUE
-from tactileq.modeling.errors import shown
+from tactileq.modeling.errors import counted, shown
 from tactileq.modeling.recordings.spectrum import MODEL_RATE_HZ
 
 SECONDS_PER_UNIT = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -29,6 +30,10 @@ SPLINE_DEGREE = 7
 # Times that count from 1970 reveal their unit: from 2001 to 2096.
 _EPOCH = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 _EPOCH_S = (1e9, 4e9)
+# After so many ticks counters begin at 0 again: micros() of an Arduino after 71 minutes.
+_COUNTERS = (2.0**16, 2.0**24, 2.0**32)
+# Late time stamps are made up for within so many samples at most.
+_LONGEST_DELAY = 10_000
 
 
 class Unevenness(NamedTuple):
@@ -105,6 +110,49 @@ class TimeColumn:
         except InputError:
             return False
         return True
+
+    def without_gaps(self, given_hz: float | None) -> tuple[slice, str]:
+        """The rows of the longest part whose times neither leave a gap nor jump back.
+
+        All rows, and no sentence about it, where there is no gap or the column is none of times: it
+        gives no rate, and neither agrees with the one that was given nor rises.
+
+        docs/method/recordings.md#gaps
+        """
+        steps, breaks = self.steps(), _breaks(self.values)
+        ends = np.array([0, *(breaks + 1), self.values.size])
+        longest = int(np.argmax(np.diff(ends)))
+        rows = slice(int(ends[longest]), int(ends[longest + 1]))
+        part = replace(self, values=self.values[rows])
+        has_a_rate = part.has_a_rate()
+        is_time = given_hz is not None and (part.agrees(given_hz) or (steps >= 0).all())
+        if not breaks.size or not (has_a_rate or is_time):
+            return slice(0, self.values.size), ""
+        rate_hz = part.rate_hz() if has_a_rate else given_hz or np.nan
+        worst = int(breaks[np.argmax(np.abs(steps[breaks]))])
+        lost_s = float(steps[worst] / part.steps().mean()) / rate_hz
+        what = f"leave a gap of {lost_s:.4g} s" if lost_s > 0 else f"jump back by {-lost_s:.4g} s"
+        more = f" (and {counted(breaks.size - 1, 'more break')})" if breaks.size > 1 else ""
+        return rows, (
+            f"{self.file}: its times {what} after row {worst + 1} of the numbers, at "
+            f"{self.values[worst]:.10g} in {shown(self.name)}{more}; the longest part without a "
+            f"break is taken, rows {rows.start + 1} to {rows.stop}, and "
+            f"{self.values.size - part.values.size} of {self.values.size} samples are left out; "
+            "record again if they are needed."
+        )
+
+    def steps(self) -> Floats:
+        """From each time to the next."""
+        return np.diff(self.values)
+
+    def agrees(self, rate_hz: float) -> bool:
+        """Whether the mean or the typical step is that of a rate, in any unit."""
+        steps = self.steps()
+        if not (np.isfinite(steps).all() and (steps > 0).any()):
+            return False
+        both = np.array([steps.mean(), np.median(steps[steps > 0])])
+        ratios = rate_hz * np.outer(both, list(SECONDS_PER_UNIT.values()))
+        return bool((np.abs(ratios - 1) <= RATE_TOLERANCE).any())
 
     def contradiction(self, rate_hz: float) -> str | None:
         """A sentence where neither the mean nor the typical step agrees with a rate that was given.
@@ -192,11 +240,49 @@ class TimeColumn:
         if steps.max() > LONGEST_GAP * max(mean_step, tick):
             typical = float(np.median(steps[steps > 0]))
             raise InputError(
-                f"expected evenly spaced samples in {self.file}, got a gap of {steps.max():.4g} s "
-                f"among steps of typically {typical:.4g} s; samples are missing, record again or "
-                "give --rate."
+                f"expected evenly spaced samples in {self.file}, got a step of {steps.max():.4g} s "
+                f"among steps of typically {typical:.4g} s; give --rate, or record again."
             )
         return mean_step
+
+
+def _breaks(values: Floats) -> NDArray[np.intp]:
+    """After which rows times leave a gap or jump back.
+
+    Time stamps may repeat and jump by whole ticks. No sample is missing at a single wrong stamp, or
+    where one that came late is followed by others that came too soon.
+    """
+    steps = np.diff(values)
+    rising = np.sort(steps[steps > 0])
+    if not (np.isfinite(values).all() and rising.size):
+        return np.array([], dtype=np.intp)
+    typical = rising[(rising.size - 1) // 2]
+    usual = np.abs(steps) <= LONGEST_GAP * typical
+    spacing = float(steps[usual].mean())
+    over_two = np.abs(values[2:] - values[:-2])
+    one_wrong = ~usual[:-1] & ~usual[1:] & (over_two <= 2 * LONGEST_GAP * typical)
+    usual[:-1] |= one_wrong
+    usual[1:] |= one_wrong
+
+    def lasts(row: int) -> bool:
+        delay = int(min(steps[row] / spacing, _LONGEST_DELAY / 2)) if spacing > 0 else 0
+        after = values[row + 1 : row + 2 + 2 * max(delay, 0)] - values[row]
+        late = after - spacing * np.arange(1, after.size + 1)
+        return steps[row] < 0 or bool(late.min() > (LONGEST_GAP - 1) * typical)
+
+    return np.array([row for row in np.flatnonzero(~usual) if lasts(int(row))], dtype=np.intp)
+
+
+def unwrapped(values: Floats) -> Floats:
+    """Times of a counter that began at 0 again, as if it had gone on."""
+    steps = np.diff(values)
+    if not (np.isfinite(values).all() and (steps > 0).any()):
+        return values
+    longest = LONGEST_GAP * float(np.median(steps[steps > 0]))
+    for counter in _COUNTERS:
+        began = (steps < 0) & (steps + counter >= 0) & (steps + counter <= longest)
+        values = values + counter * np.append(0, np.cumsum(began))
+    return values
 
 
 def _astray(time_s: Floats) -> tuple[float, float]:

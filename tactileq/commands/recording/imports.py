@@ -317,7 +317,8 @@ def add_to_set(
     """Add imported recordings to those that `out` already holds.
 
     `ran`: what was read. `left_out`: a sentence for each file that could not be used.
-    Implausible values are refused or, if `yes`, warned about and written into the provenance.
+    Implausible values are refused or, if `yes`, warned about. Warnings are written into the
+    provenance.
     """
     from tactileq.modeling import RecordingSet
     from tactileq.modeling.files.places import locked
@@ -337,7 +338,8 @@ def add_to_set(
     ):
         print(sentence, file=sys.stderr)
     note = out / PROVENANCE_NAME
-    taken = {"doubts": doubts} if doubts else {}
+    notes = [*(sentence for one in new for sentence in one.warnings), *left_out]
+    taken = {name: said for name, said in (("doubts", doubts), ("notes", notes)) if said}
     provenance = ran.provenance({**settings, **taken})
     # Only quick work is done under the lock, while another import into the same set has to wait.
     with staged(out, records, [one.source for one in new]) as ready, locked(out):

@@ -171,14 +171,21 @@ def test_nan_and_inf_are_named(
         import_csv([path], [LABEL], axis=axis)  # type: ignore[arg-type]
 
 
-def test_lost_samples_are_noticed(tmp_path: Path, axes: NDArray[np.float64]) -> None:
+def test_of_lost_samples_the_longest_part_is_left(
+    tmp_path: Path, axes: NDArray[np.float64]
+) -> None:
     columns = np.delete(with_time(axes[:1]), slice(700, 900), axis=1)
     path = write_csv(tmp_path / "a.csv", "time,x", columns)
-    with refused(InputError, names="a.csv", got=["0.06281 s", "0.0003125 s", "--rate"]):
+    for rate_hz in (None, RATE_HZ):
+        found = import_csv_file(path, LABEL, rate_hz=rate_hz)
+        assert found.recording.rate_hz == pytest.approx(RATE_HZ)
+        assert np.array_equal(found.recording.samples, axes[0, 900:])
+        [told] = found.warnings
+        check_refusal(told, names=["a.csv", "0.06281 s", "row 700", "700 of 1800"])
+    with pytest.warns(UserWarning, match="0.06281 s"):
         import_csv([path], [LABEL])
-    assert import_csv([path], [LABEL], rate_hz=RATE_HZ).recordings[0].rate_hz == RATE_HZ
     with refused(
-        InputError, names="a.csv", expected="--rate", got=["3000 Hz", "'time'", "2880 Hz", "s"]
+        InputError, names="a.csv", expected="--rate", got=["3000 Hz", "'time'", "3200 Hz", "s"]
     ):
         import_csv([path], [LABEL], rate_hz=3000)
 
@@ -334,7 +341,48 @@ def test_an_option_must_not_contradict_the_header(
     path = write_csv(tmp_path / "a.csv", "time_s,x_m_s2", with_time(axes[:1]))
     with refused(InputError, expected="a.csv", got=["'m/s2'", "'g'", "--unit"]):
         import_csv([path], [LABEL], unit="g")
-    assert import_csv([path], [LABEL], unit="m/s2").recordings[0].unit == "g"
+    assert import_csv([path], [LABEL], unit="m/s²").recordings[0].unit == "g"
+
+
+def test_an_option_is_taken_where_the_header_names_no_known_unit(
+    tmp_path: Path, axes: NDArray[np.float64]
+) -> None:
+    path = write_csv(tmp_path / "a.csv", "time_s,x (LSB)", with_time(axes[:1]))
+    with refused(InputError, expected="a.csv", got=["'lsb'", "--unit"]):
+        import_csv_file(path, LABEL)
+    found = import_csv_file(path, LABEL, unit="mg")
+    np.testing.assert_allclose(found.recording.samples, axes[0] / 1000, rtol=1e-12)
+    [told] = found.warnings
+    check_refusal(told, names=["a.csv", "'lsb'", "mg", "--unit"])
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "time_s,gX,aY,temperature (C)",
+        "time_s,gyro_x (rad/s),Acceleration (m/s²),accuracy",
+        "time_s,x (dps),z (mg),force_n",
+    ],
+)
+def test_the_only_acceleration_is_found_among_other_channels(
+    tmp_path: Path, axes: NDArray[np.float64], header: str
+) -> None:
+    path = write_csv(tmp_path / "a.csv", header, with_time(axes))
+    if "x (dps)" in header:  # an axis, too
+        with refused(InputError, expected="--axis", got=["x (dps)", "z (mg)"]):
+            import_csv_file(path, LABEL)
+        return
+    found = import_csv_file(path, LABEL).recording
+    assert np.corrcoef(found.samples, axes[1])[0, 1] == pytest.approx(1)
+
+
+def test_what_instruments_send_for_an_overload_is_named(
+    tmp_path: Path, axes: NDArray[np.float64]
+) -> None:
+    axes[0, 41] = -9.9e37
+    path = write_csv(tmp_path / "a.csv", "time_s,x_g", with_time(axes[:1]))
+    with refused(InputError, names="a.csv", expected="range", got=["9.9e+37", "row 42"]):
+        import_csv_file(path, LABEL)
 
 
 def test_one_broken_file_of_many_is_named_and_left_out(
