@@ -24,7 +24,12 @@ from tactileq.modeling.errors import counted, shown
 from tactileq.modeling.files.others.labels import Labels, is_no_name
 from tactileq.modeling.files.others.numbers import NO_NUMBER
 from tactileq.modeling.files.others.roles import parse_roles
-from tactileq.modeling.files.others.table import OtherTable, read_other_table, same_name
+from tactileq.modeling.files.others.table import (
+    OtherTable,
+    left_out_sentence,
+    read_other_table,
+    same_name,
+)
 
 ROLES = ("participant", "presented", "answered", "correct", "share", "value", "count")
 MEASURES = ("correct", "share", "value")
@@ -38,7 +43,6 @@ RESERVED = frozenset(
 EXAMPLE = "correct=TYPE_ANS,factor=TYPE,participant=ID"
 RIGHT = {"1": 1.0, "0": 0.0, "true": 1.0, "false": 0.0}
 NO_ANSWER = frozenset({"na", "null", "."})  # what may be an answer of this name, or none
-MOST_LINES = 3  # places that a note names
 
 Mask = npt.NDArray[np.bool_]
 
@@ -243,7 +247,7 @@ class _Found:
     def add(self, table: OtherTable) -> None:
         """Read one more table."""
         self.tables.append(table)
-        for what, numbers in (table.left_out or {}).items():
+        for what, numbers in table.left_out.items():
             self.leave_out(what, [f"{table.path.name}, line {number}" for number in numbers])
         if self.mapping.is_matrix:
             matrix = answer_matrix(table, labels=self.labels)
@@ -320,12 +324,7 @@ class _Found:
 
     def notes(self, rows: pd.DataFrame) -> tuple[str, ...]:
         """A sentence for each kind of lines left out, and for what was decided."""
-        sentences = [
-            f"{counted(len(places), 'line')} left out that {what} ({_first(places)})."
-            if len(places) > 1
-            else f"1 line left out that {_singular(what)} ({places[0]})."
-            for what, places in self.left_out.items()
-        ]
+        sentences = [left_out_sentence(what, places) for what, places in self.left_out.items()]
         if self.codes:
             every = ", ".join(f"{code} ({n})" for code, n in sorted(self.codes.items()))
             sentences.append(f"Codes of the answers: {every}; right: {self.mapping.right}.")
@@ -340,17 +339,6 @@ class _Found:
                     "counts as a wrong answer."
                 )
         return tuple(sentences)
-
-
-def _first(places: Sequence[str]) -> str:
-    more = f" and {len(places) - MOST_LINES} more" if len(places) > MOST_LINES else ""
-    return "; ".join(places[:MOST_LINES]) + more
-
-
-def _singular(what: str) -> str:
-    """What one line does: `repeat the header` → `repeats the header`."""
-    verb, _, rest = what.partition(" ")
-    return f"{ {'have': 'has', 'do': 'does'}.get(verb, verb + 's') } {rest}"
 
 
 def _twice_over(tables: Sequence[OtherTable]) -> list[str]:

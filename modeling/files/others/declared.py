@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from tactileq.modeling.files.columns import Column, names
+from tactileq.modeling.errors import InputError
+from tactileq.modeling.files.columns import MISSING, Column, names
 from tactileq.modeling.files.others.numbers import PLAIN
 from tactileq.modeling.files.others.table import read_other_table
 from tactileq.modeling.files.tables import Row, check_header, typed, unguarded
@@ -44,10 +45,9 @@ def read_user_cells(
     present = [name for name in names(columns) if name in table.names]
     numeric = [c.name for c in columns if c.limits is not None and c.name in present]
     # What has a decimal point throughout is as it is declared, whatever else it may look like.
-    plain = all(
-        map(PLAIN.pattern.fullmatch, (c for name in numeric for c in table.cells(name) if c))
-    )
-    style = PLAIN if plain else table.numbers(numeric)
+    numbers = [cell for name in numeric for cell in table.cells(name) if cell not in MISSING]
+    is_plain = all(map(PLAIN.pattern.fullmatch, numbers))
+    style = PLAIN if is_plain else table.numbers(numeric)
     rows = []
     for line in table.lines:
         cells = dict(zip(table.names, line.cells, strict=True))

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby, zip_longest
 from pathlib import Path
 from statistics import mode
+
+import numpy as np
 
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import InputError, counted, shortened, shown
@@ -28,6 +30,7 @@ from tactileq.modeling.files.others.splitting import (
 )
 
 MOST_NAMES = 200  # characters of the names of columns that a refusal lists
+_MOST_PLACES = 3  # lines that a note names
 _SAMPLED = 200  # lines of numbers by which columns of numbers are found
 _IMPORT_ID = '{"importid"'  # Qualtrics' third line; its second one holds the questions' texts
 
@@ -47,12 +50,15 @@ class OtherTable:
         Of the columns, blank where the header is.
     lines : list of Line
         Below the header, each with a cell per column.
-    above : tuple of Line
-        Between the line of names and the numbers: units.
+    header_line : int
+        Number of the line of names.
     left_out : mapping of str to list of int
-        Numbers of lines that are no rows, by what they are.
-    trailing : list of str
-        First cells of lines that have a blank cell more than the header; empty where none is open.
+        Numbers of lines that are no rows, by what they do.
+    numeric : tuple of int
+        Columns that hold numbers; only of tables of numbers.
+    has_open_row_names : bool
+        Whether each line has a blank cell more than the header, so that its first one may be a name
+        of the row.
     """
 
     path: Path
@@ -61,8 +67,8 @@ class OtherTable:
     separator: str
     text: Text
     header_line: int
-    above: tuple[Line, ...] = ()
-    left_out: Mapping[str, list[int]] | None = None
+    left_out: Mapping[str, list[int]] = field(default_factory=dict)
+    numeric: tuple[int, ...] = ()
     has_open_row_names: bool = False
 
     def where(self, line: Line) -> str:
@@ -92,7 +98,7 @@ class OtherTable:
             there = shortened(", ".join(filter(None, self.names)), longest=MOST_NAMES)
             raise InputError(
                 f"expected one column {shown(name)} in {self.path}, line {self.header_line}, got "
-                f"{what}; there are {there or 'none'}."
+                f"{what}; there are {there or 'none'}; correct --map."
             )
         return same[0]
 
@@ -166,6 +172,16 @@ class OtherTable:
         return cell
 
 
+def left_out_sentence(what: str, places: Sequence[str]) -> str:
+    """That lines were left out, and why: `2 lines left out that repeat the header (line 9; …).`"""
+    more = f" and {len(places) - _MOST_PLACES} more" if len(places) > _MOST_PLACES else ""
+    verb, _, rest = what.partition(" ")
+    if len(places) == 1:
+        what = f"{'has' if verb == 'have' else f'{verb}s'} {rest}"
+    there = "; ".join(places[:_MOST_PLACES]) + more
+    return f"{counted(len(places), 'line')} left out that {what} ({there})."
+
+
 def number_of(name: str) -> int | None:
     """The number of a column that is named by it, as in #3."""
     digits = name[1:] if name.startswith("#") else ""
@@ -225,7 +241,7 @@ def read_other_table(
         _check_whole(lines[header:], path)
     table = _table(path, text, parsed.separator, lines, header=header)
     above = [line.number for line in lines[:header]]
-    return replace(table, left_out={"stand above the header": above, **(table.left_out or {})})
+    return replace(table, left_out={"stand above the header": above, **table.left_out})
 
 
 def _check_whole(lines: Sequence[Line], path: Path) -> None:
@@ -394,7 +410,10 @@ def read_number_table(
 
     def header_in(lines: Sequence[Line]) -> int | None:
         run = _run_of_numbers(lines)
-        return None if run is None else max(run.start - 1, 0)
+        above = max(run.start - 1, 0) if run else 0
+        cells = [cell for cell in lines[above].cells if cell] if run else []
+        holds_numbers = 2 * sum(map(is_number, cells)) > len(cells)
+        return None if run is None or (holds_numbers and run.start) else above
 
     parsed = _parsed(text, path, header_in, comments=True)
     lines, run = parsed.lines, _run_of_numbers(parsed.lines)
@@ -417,7 +436,8 @@ def read_number_table(
     above = [line.number for line in lines[: run.start] if line.number < first.number]
     below = [line.number for line in lines[run.stop :]]
     left_out = {"stand above the header": above, "stand below the numbers": below}
-    return replace(table, left_out={**left_out, **(table.left_out or {})})
+    numeric = tuple(place for place in run.columns if place < len(table.names))
+    return replace(table, left_out={**left_out, **table.left_out}, numeric=numeric)
 
 
 @dataclass(frozen=True)
@@ -450,13 +470,10 @@ def _run_of_numbers(lines: Sequence[Line]) -> _Run | None:
             start, stop, most = places[0], places[-1] + 1, width
     if stop == start:
         return None
-    sample = lines[start + (stop - start) // 4 : stop]
+    sample = lines[start + max((stop - start) // 4, stop - start > 1) : stop]
     sample = sample[:: max(1, len(sample) // _SAMPLED)]
-    columns = tuple(
-        i
-        for i in range(most)
-        if sum(is_number(line.cells[i]) for line in sample) > 0.9 * len(sample)
-    )
+    shares = [np.mean([is_number(line.cells[i]) for line in sample]) for i in range(most)]
+    columns = tuple(place for place, share in enumerate(shares) if share >= 0.5)
     run = _Run(start, stop, most, columns)
     if not columns:
         return None
@@ -467,6 +484,13 @@ def _run_of_numbers(lines: Sequence[Line]) -> _Run | None:
 def _check_run(lines: Sequence[Line], run: _Run, path: Path) -> None:
     """Refuse numbers outside of the run: a damaged line splits what was one."""
     for line in lines[run.stop :]:
+        inside = [line.cells[i] for i in run.columns if len(line.cells) == run.width]
+        others = [cell for cell in inside if not is_number(cell)]
+        if inside and len(others) < len(inside):
+            raise InputError(
+                f"expected numbers in line {line.number} of {path.name}, got {shown(others[0])}; "
+                "correct that cell, or record again."
+            )
         if any(map(is_number, line.cells)):
             raise _damaged(line, run, path)
     for line in lines[: run.start]:
@@ -489,10 +513,12 @@ def _names_above(
     named = {same_name(name) for name in wanted if number_of(name) is None}
     if not lines:
         return None, []
-    cells = [cell for cell in lines[-1].cells if cell]
-    units = lines[-1].cells if len(lines) > 1 and cells and all(map(is_unit, cells)) else []
+    fits = [line for line in lines if named <= set(map(same_name, line.cells))]
+    last = [cell for cell in lines[-1].cells if cell]
+    before = lines[-2] if len(lines) > 1 else None
+    is_header = lines[-1] in fits if named else not before or any(map(is_number, before.cells))
+    units = lines[-1].cells if before and not is_header and all(map(is_unit, last)) else []
     above = lines[:-1] if units else lines
-    fits = [line for line in above if named <= set(map(same_name, line.cells))]
     header = fits[-1] if named and fits else above[-1]
     with_units = [
         f"{name} ({unit.strip('()[] ')})" if unit else name

@@ -21,10 +21,8 @@ from tactileq.modeling.recordings.spectrum import dft321
 from tactileq.rig.recording.importing.csv_columns import (
     AXES,
     Axis,
-    chosen_axes,
     only_axis_of,
-    read_columns,
-    time_column,
+    read_log,
 )
 from tactileq.rig.recording.importing.headers import OVERLOAD, known_unit
 from tactileq.rig.recording.importing.labels import Label
@@ -170,16 +168,15 @@ def import_csv_file(
         )
     unit = unit and (known_unit(unit) or unit)
     _check_unit(unit, "--unit")
-    columns, warnings = read_columns(path, named or {})
-    time = time_column(path, columns)
-    axes, found_unit = chosen_axes(path, columns, axis or only_axis_of(named or {}))
+    log = read_log(path, named or {}, axis or only_axis_of(named or {}))
+    time, axes = log.time, log.axes
     rows, gap = time.without_gaps(rate_hz) if time else (slice(None), "")
     _check_overload(path, axes, rows)
     axes, time = axes[:, rows], time and replace(time, values=time.values[rows])
     # Combined axes no longer show their limits, nor do resampled ones: they are looked for here.
     clipped_share = float(np.any([clipped_samples(one) for one in axes], axis=0).mean())
-    rate_hz, axes, uneven, contradiction = _even(path, time, axes, columns, given_hz=rate_hz)
-    final_unit, other_unit = _unit(path, found_unit, given=unit)
+    rate_hz, axes, uneven, contradiction = _even(path, time, axes, log.names, given_hz=rate_hz)
+    final_unit, other_unit = _unit(path, log.unit, given=unit)
     recording = _recording(
         path,
         (dft321(axes) if len(axes) == 3 else axes[0]) * _g_per(final_unit, mv_per_g, path.name),
@@ -191,7 +188,7 @@ def import_csv_file(
     taken_as = "g" if final_unit in VOLTS_PER_UNIT else final_unit
     return Imported(
         recording,
-        (*warnings, *filter(None, (gap, other_unit)), *uneven, *_too_short(path, recording)),
+        (*log.warnings, *filter(None, (gap, other_unit)), *uneven, *_too_short(path, recording)),
         doubts=(*contradiction, *doubts_about(recording, path.name, unit=taken_as)),
     )
 
@@ -231,7 +228,7 @@ def _even(
     path: Path,
     time: TimeColumn | None,
     axes: Floats,
-    columns: Mapping[str, Floats],
+    columns: Sequence[str],
     *,
     given_hz: float | None,
 ) -> tuple[float, Floats, Sequence[str], Sequence[str]]:

@@ -105,8 +105,12 @@ def import_csv(
         str | None, typer.Option("--time-column", help="Name of the time column.")
     ] = None,
     columns: Annotated[
-        str | None,
-        typer.Option("--map", help="Meaning of the columns: time=Zeit,z=Beschl_Z."),
+        list[str] | None,
+        typer.Option(
+            "--map",
+            help="Meaning of the columns: time=Zeit,z=Beschl_Z, or a TOML file with these; "
+            "repeatable.",
+        ),
     ] = None,
     yes: Yes = False,
 ) -> None:
@@ -120,20 +124,21 @@ def import_csv(
 
     Example: tactileq import csv *.csv --labels labels.tsv --map time=Zeit,z=Kanal_1 --mv-per-g 100
     """
+    from tactileq.modeling.files.others.roles import is_file_of_roles
     from tactileq.rig.recording.importing.csv_columns import parse_columns
     from tactileq.rig.recording.importing.files import import_csv_file, usable
 
-    role_of = parse_columns(columns) if columns is not None else {}
+    role_of = parse_columns(columns or ())
     if time_column is not None:
         if "time" in role_of:
             raise ValueError(
                 f"expected the column of times once, got --time-column {time_column} and --map "
-                f"{columns}; leave one out."
+                f"{' '.join(columns or ())}; leave one out."
             )
         role_of["time"] = time_column
 
     ran = CommandRun("import csv")
-    ran.reads(*files, labels)
+    ran.reads(*files, labels, *map(Path, filter(is_file_of_roles, columns or ())))
     named = labels_of(files, labels, texture=texture or out.name, speed=speed, force=force)
     read = partial(
         import_csv_file, axis=axis, unit=unit, rate_hz=rate_hz, mv_per_g=mv_per_g, named=role_of
