@@ -74,6 +74,12 @@ class ImportedAnswers:
         Of the confusion matrices, in order; empty where there are none.
     missed : int
         Trials without an answer; they are not among the answers.
+    presented : tuple of str
+        Classes that were presented, in order; empty: all of them.
+    notes : tuple of str
+        What was decided while reading, a sentence each.
+    response : str
+        Where no answer is right, the response whose share `correct` holds; else empty.
     """
 
     answers: pd.DataFrame
@@ -81,6 +87,9 @@ class ImportedAnswers:
     measure: str
     classes: tuple[str, ...] = ()
     missed: int = 0
+    presented: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    response: str = ""
 
 
 @dataclass(frozen=True)
