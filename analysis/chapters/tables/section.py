@@ -138,7 +138,10 @@ def _condition_section(imported: ImportedAnswers, cells: pd.DataFrame, *, mean: 
             f"Tables: {counted(people, 'participant')}, "
             f"{counted(trials, 'answered trial')}{missed}.",
         ),
-        tiles=((str(people), "participants"), (str(trials), "answered trials")),
+        tiles=tuple(
+            (str(number), counted(number, noun).partition(" ")[2])
+            for number, noun in ((people, "participant"), (trials, "answered trial"))
+        ),
     )
 
 
