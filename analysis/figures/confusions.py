@@ -26,7 +26,7 @@ def plot_confusion(matrix: ConfusionMatrix, *, simulated: bool, ax: Axes | None 
         shade = "black" if not share > DARK else "white"
         shade = shade if np.isfinite(share) else GREY
         ax.text(column, row, text, ha="center", va="center", fontsize=size, color=shade)
-    name_axes(ax, rows=matrix.textures, columns=matrix.textures)
+    name_axes(ax, rows=matrix.rows, columns=matrix.textures)
     ax.set_xlabel("virtual surface answered")
     ax.set_ylabel("real surface presented")
     stamp_if_simulated(ax, simulated)

@@ -22,14 +22,22 @@ class ConfusionMatrix:
     model : str
         Name of the set of models.
     textures : (k,) tuple of str
-        Names of rows and columns.
+        Names of the columns.
     counts : (k, k) ndarray of int
         Row: the real surface presented; column: the virtual surface answered.
+    presented : tuple of str
+        Names of the rows, where they are not those of the columns.
     """
 
     model: str
     textures: tuple[str, ...]
     counts: NDArray[np.int64]
+    presented: tuple[str, ...] = ()
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """Names of the rows."""
+        return self.presented or self.textures
 
     @property
     def row_shares(self) -> Floats:
@@ -126,6 +134,6 @@ def confusion_table(matrix: ConfusionMatrix) -> pd.DataFrame:
             "count": int(matrix.counts[i, j]),
             "row_share": shares[i, j],
         }
-        for i, real in enumerate(matrix.textures)
+        for i, real in enumerate(matrix.rows)
         for j, virtual in enumerate(matrix.textures)
     )

@@ -188,6 +188,15 @@ def t_test(differences: Floats) -> tuple[float, float, float, float]:
     return t, p, low, high
 
 
+def mean_test(differences: Floats, *, rng: np.random.Generator) -> tuple[float, float]:
+    """t and two-sided p of their mean; of sign flips, with t NaN, where participants are alike."""
+    rounded = without_rounding_noise(differences)
+    if why_undefined(rounded):
+        needless = rounded.size and not rounded.any()  # zeros have no sign to draw
+        return float("nan"), 1.0 if needless else sign_flips_p(rounded, rng=rng)
+    return t_test(rounded)[:2]
+
+
 def t_tests(
     differences: Floats, *, confidence: float = CONFIDENCE
 ) -> tuple[Floats, Floats, Floats, Floats]:

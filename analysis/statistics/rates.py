@@ -16,9 +16,8 @@ from tactileq.analysis.statistics.paired import (
     holm,
     ignoring_case,
     mean,
-    sign_flips_p,
+    mean_test,
     standard_error,
-    t_test,
     why_undefined,
     without_rounding_noise,
 )
@@ -114,7 +113,7 @@ def _rate_row(rates: Floats, *, rng: np.random.Generator, chance: float) -> dict
     """Of one rate per participant."""
     undefined = why_undefined(without_rounding_noise(rates))
     low, high = (np.nan, np.nan) if undefined else bootstrap_interval(rates, rng)
-    t, p = _against_chance(rates - chance, rng=rng)
+    t, p = (np.nan, np.nan) if np.isnan(chance) else mean_test(rates - chance, rng=rng)
     return {
         "participants": rates.size,
         "mean": mean(rates),
@@ -126,14 +125,6 @@ def _rate_row(rates: Floats, *, rng: np.random.Generator, chance: float) -> dict
         "p": p,
         "note": UNKNOWN_CHANCE if np.isnan(chance) else undefined,
     }
-
-
-def _against_chance(above: Floats, *, rng: np.random.Generator) -> tuple[float, float]:
-    """t and p of rates less chance; NaN of an unknown one."""
-    above = without_rounding_noise(above)
-    if np.isnan(above).any():
-        return np.nan, np.nan
-    return (np.nan, sign_flips_p(above, rng=rng)) if why_undefined(above) else t_test(above)[:2]
 
 
 def bootstrap_interval(rates: Floats, rng: np.random.Generator) -> tuple[float, float]:

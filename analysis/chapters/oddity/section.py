@@ -13,7 +13,6 @@ import pandas as pd
 
 from tactileq.analysis.answers.responses import Responses
 from tactileq.analysis.chapters.chapter import Answered, who_took_part
-from tactileq.analysis.chapters.oddity.dprime import d_primes, oddity_d_prime
 from tactileq.analysis.columns import TEXTURE
 from tactileq.analysis.labels import ALL_TEXTURES, TASK_TITLES, sentence_case
 from tactileq.analysis.page.outcomes import Outcome, Weight
@@ -21,6 +20,7 @@ from tactileq.analysis.page.page import Table
 from tactileq.analysis.page.sections import Section, of_task
 from tactileq.analysis.statistics.claims import NO_TEST
 from tactileq.analysis.statistics.compared_answers import is_oddity
+from tactileq.analysis.statistics.dprime import d_primes, oddity_d_prime
 from tactileq.analysis.statistics.verdicts import ClaimFound
 from tactileq.modeling.files.answer_tables import AnswerTable
 from tactileq.modeling.files.columns import Column, names

@@ -5,7 +5,6 @@ docs/method/tables.md#analysis-of-variance
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
@@ -16,10 +15,17 @@ import pandas as pd
 from scipy import linalg, stats
 
 from tactileq.analysis.columns import P
-from tactileq.analysis.statistics.paired import CONFIDENCE, holm, paired_test, t_interval
+from tactileq.analysis.statistics.paired import (
+    CONFIDENCE,
+    holm,
+    mean_test,
+    t_interval,
+    why_undefined,
+    without_rounding_noise,
+)
 from tactileq.modeling import InputError
 from tactileq.modeling.arrays import Floats
-from tactileq.modeling.files.columns import Column
+from tactileq.modeling.files.columns import Column, names
 
 EFFECT = Column("effect", is_name=True)
 ANOVA_COLUMNS = (
@@ -29,10 +35,13 @@ ANOVA_COLUMNS = (
     Column("F", format=".3f"),
     P,
     Column("epsilon", "ε of Greenhouse and Geisser", format=".3f"),
+    Column("df_effect_corrected", "df of the effect, times ε", format=".2f"),
+    Column("df_error_corrected", "df of the error, times ε", format=".2f"),
     Column("p_corrected", "p, corrected by ε", is_p_value=True),
     Column("generalized_eta_squared", "generalized η²", format=".3f"),
     Column("n", "participants"),
 )
+CORRECTED = ("epsilon", "df_effect_corrected", "df_error_corrected", "p_corrected")
 CONDITION_COLUMNS = (
     Column("condition", is_name=True),
     Column("n", "participants"),
@@ -74,12 +83,16 @@ class CompleteCells:
     excluded: tuple[str, ...]
 
     @property
-    def long(self) -> pd.DataFrame:
-        """One row per participant and cell: participant_id, the factors and mean."""
-        index = pd.MultiIndex.from_product(
-            [self.participants, *self.levels.values()], names=["participant_id", *self.levels]
-        )
-        return pd.DataFrame({"mean": self.means.ravel()}, index=index).reset_index()
+    def size(self) -> float:
+        """The power of ten above all means: rounding errors are relative to it."""
+        largest = float(np.abs(self.means).max(initial=0.0))
+        return float(10.0 ** np.ceil(np.log10(largest))) if largest else 1.0
+
+    def level_means(self, factor: str) -> dict[str, float]:
+        """Mean of each level of a factor, over participants and the other factors."""
+        axis = 1 + list(self.levels).index(factor)
+        others = tuple(i for i in range(self.means.ndim) if i != axis)
+        return dict(zip(self.levels[factor], map(float, self.means.mean(axis=others)), strict=True))
 
 
 def participant_cells(
@@ -134,13 +147,20 @@ def cell_means(cells: pd.DataFrame, factors: Sequence[str]) -> pd.DataFrame:
     rows = []
     for condition, cell in cells.groupby("condition", sort=False):
         values = cell["mean"].to_numpy(dtype=float)
-        low, high = t_interval(values)
+        low, high = interval_of(values)
         row: dict[str, object] = {factor: cell[factor].iloc[0] for factor in factors}
         row |= {"condition": condition, "n": values.size, "mean": float(values.mean())}
         rows.append(row | {"ci_low": low, "ci_high": high})
     table = pd.DataFrame(rows)
     order = sorted(table.index, key=lambda i: [in_order(table.loc[i, f]) for f in factors])
     return table.loc[order].reset_index(drop=True)
+
+
+def interval_of(values: Floats) -> tuple[float, float]:
+    """Student's 95 % interval of participants' mean; NaN where they are alike, as the test is."""
+    return (
+        (np.nan, np.nan) if np.ptp(values) <= 1e-12 * np.abs(values).max() else t_interval(values)
+    )
 
 
 def complete_cells(cells: pd.DataFrame, factors: Sequence[str]) -> CompleteCells:
@@ -157,10 +177,10 @@ def complete_cells(cells: pd.DataFrame, factors: Sequence[str]) -> CompleteCells
         Where a factor has one level, or is constant within each participant.
     """
     levels = {f: tuple(sorted(cells[f].unique(), key=in_order)) for f in factors}
-    for factor, names in levels.items():
-        if len(names) < 2:
+    for factor, own in levels.items():
+        if len(own) < 2:
             raise InputError(
-                f"expected two levels or more of the factor {factor}, got {', '.join(names)}; "
+                f"expected two levels or more of the factor {factor}, got {', '.join(own)}; "
                 "leave it out of the map."
             )
         if cells.groupby("participant_id")[factor].nunique().max() < 2:
@@ -172,7 +192,7 @@ def complete_cells(cells: pd.DataFrame, factors: Sequence[str]) -> CompleteCells
     wide = cells.pivot_table(index="participant_id", columns=list(factors), values="mean")
     wide = wide.reindex(columns=every if len(factors) > 1 else every.get_level_values(0))
     whole = wide.dropna()
-    shape = (len(whole), *(len(names) for names in levels.values()))
+    shape = (len(whole), *(len(own) for own in levels.values()))
     excluded = tuple(wide.index.difference(whole.index))
     return CompleteCells(tuple(whole.index), levels, whole.to_numpy().reshape(shape), excluded)
 
@@ -190,8 +210,8 @@ def repeated_measures_anova(complete: CompleteCells) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        `ANOVA_COLUMNS`, a row per effect; `p_corrected` equals p where the effect has one degree of
-        freedom. F and p are NaN where an effect is the same in all participants.
+        `ANOVA_COLUMNS`, a row per effect; what is corrected equals the uncorrected where the effect
+        has one degree of freedom. F and p are NaN where an effect is the same in all participants.
 
     Raises
     ------
@@ -204,82 +224,40 @@ def repeated_measures_anova(complete: CompleteCells) -> pd.DataFrame:
             f"expected two participants or more with answers in every condition, got {n}; "
             "collect the missing ones or leave a factor out."
         )
+    effects = _effects(complete)
+    unexplained = sum(map(_error_squares, [_scores(complete.means, ()), *effects.values()]))
     factors = list(complete.levels)
-    table = _few_factors(complete.long, factors) if len(factors) < 3 else _many_factors(complete)
-    single = table["df_effect"] == 1
-    table.loc[single, "epsilon"] = 1.0
-    table.loc[single, "p_corrected"] = table.loc[single, "p"]
-    table["n"] = n
-    # Where all participants show one effect alike, F would be rounding over rounding.
-    alike = [float(np.ptp(score, axis=0).max()) < 1e-12 for score in _effects(complete).values()]
-    undefined = ["F", "p", "epsilon", "p_corrected", "generalized_eta_squared"]
-    table.loc[alike, undefined] = np.nan
-    return table
-
-
-def _few_factors(long: pd.DataFrame, factors: list[str]) -> pd.DataFrame:
-    from pingouin import rm_anova  # late: it takes a second to import
-
-    within = factors[0] if len(factors) == 1 else factors
-    with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "The inplace keyword", module="pingouin")
-        found = rm_anova(
-            data=long,
-            dv="mean",
-            within=within,
-            subject="participant_id",
-            correction=True,
-            effsize="ng2",
-        )
-    # It drops columns without any number.
-    numbers = ["ddof1", "ddof2", "F", "p_unc", "eps", "p_GG_corr", "ng2"]
-    found = found.reindex(columns=["Source", *numbers])
-    return pd.DataFrame(
-        {
-            "effect": [str(source).replace(" * ", " × ") for source in found["Source"]],
-            "df_effect": found["ddof1"].astype(int),
-            "df_error": found["ddof2"].astype(int),
-            "F": found["F"],
-            "p": found["p_unc"],
-            "epsilon": found["eps"],
-            "p_corrected": found["p_GG_corr"],
-            "generalized_eta_squared": found["ng2"],
-        }
-    )
-
-
-def _many_factors(complete: CompleteCells) -> pd.DataFrame:
-    """F and p by statsmodels, which has neither ε nor η²: those from orthonormal contrasts."""
-    from statsmodels.stats.anova import AnovaRM  # late: it takes a second to import
-
-    factors = list(complete.levels)
-    # Names of columns become names in a formula: only plain ones are safe there.
-    plain = {factor: f"f{number}" for number, factor in enumerate(factors)}
-    long = complete.long.rename(columns=plain)
-    found = AnovaRM(long, "mean", "participant_id", within=list(plain.values())).fit().anova_table
-    scores = _effects(complete)
-    unexplained = complete.means.size * np.var(complete.means) - sum(
-        len(score) * np.sum(score.mean(axis=0) ** 2) for score in scores.values()
-    )
     rows = []
-    for which, score in scores.items():
-        test = found.loc[":".join(f"f{i}" for i in which)]
-        squares = len(score) * np.sum(score.mean(axis=0) ** 2)
-        epsilon = _epsilon(score)
-        f, df, df_error = (float(test[name]) for name in ("F Value", "Num DF", "Den DF"))
-        rows.append(
-            {
-                "effect": " × ".join(factors[i] for i in which),
-                "df_effect": int(df),
-                "df_error": int(df_error),
-                "F": f,
-                "p": float(test["Pr > F"]),
-                "epsilon": epsilon,
-                "p_corrected": float(stats.f.sf(f, epsilon * df, epsilon * df_error)),
-                "generalized_eta_squared": _share(squares, squares + unexplained),
-            }
-        )
-    return pd.DataFrame(rows)
+    for which, scores in effects.items():
+        row: dict[str, object] = {"effect": " × ".join(factors[i] for i in which)}
+        # Where all participants show one effect alike, F would be rounding over rounding.
+        alike = float(np.ptp(scores, axis=0).max()) <= 1e-12 * complete.size
+        rows.append(row | _f_test(scores, unexplained=np.nan if alike else unexplained) | {"n": n})
+    return pd.DataFrame(rows, columns=names(ANOVA_COLUMNS))
+
+
+def _f_test(scores: Floats, *, unexplained: float) -> dict[str, float]:
+    """The row of an effect from its scores; without F where `unexplained` is NaN."""
+    n, df = scores.shape
+    found: dict[str, float] = {"df_effect": df, "df_error": df * (n - 1)}
+    if np.isnan(unexplained):
+        return found
+    squares = n * float(np.sum(scores.mean(axis=0) ** 2))
+    f, epsilon = (n - 1) * squares / _error_squares(scores), _epsilon(scores)
+    corrected = epsilon * df, epsilon * df * (n - 1)
+    return found | {
+        "F": f,
+        "p": float(stats.f.sf(f, df, df * (n - 1))),
+        "epsilon": epsilon,
+        "df_effect_corrected": corrected[0],
+        "df_error_corrected": corrected[1],
+        "p_corrected": float(stats.f.sf(f, *corrected)),
+        "generalized_eta_squared": squares / (squares + unexplained),
+    }
+
+
+def _error_squares(scores: Floats) -> float:
+    return float(np.sum((scores - scores.mean(axis=0)) ** 2))
 
 
 def _effects(complete: CompleteCells) -> dict[tuple[int, ...], Floats]:
@@ -304,11 +282,7 @@ def _scores(means: Floats, which: tuple[int, ...]) -> Floats:
 def _epsilon(scores: Floats) -> float:
     """Greenhouse and Geisser's ε: 1 where the contrasts vary alike and do not covary."""
     covariance = np.atleast_2d(np.cov(scores, rowvar=False))
-    return _share(np.trace(covariance) ** 2, len(covariance) * np.sum(covariance**2))
-
-
-def _share(part: float, whole: float) -> float:
-    return float(part / whole) if whole > 0 else float("nan")
+    return float(np.trace(covariance) ** 2 / (len(covariance) * np.sum(covariance**2)))
 
 
 def pairwise_tests(complete: CompleteCells, *, rng: np.random.Generator) -> pd.DataFrame:
@@ -328,15 +302,19 @@ def pairwise_tests(complete: CompleteCells, *, rng: np.random.Generator) -> pd.D
         means = complete.means.mean(axis=others)
         rows: list[dict[str, object]] = []
         for first, second in combinations(range(len(levels)), 2):
-            test = paired_test(means[:, first], means[:, second], rng=rng)
-            row: dict[str, object] = {
-                "factor": factor,
-                "pair": f"{levels[second]} − {levels[first]}",
-            }
-            shown = ("n", "mean_difference", "ci_low", "ci_high", "t", "df", "p", "d_z", "note")
-            rows.append(row | {name: getattr(test, name) for name in shown})
+            found = _pair(means[:, second] - means[:, first], size=complete.size, rng=rng)
+            pair = f"{levels[second]} − {levels[first]}"
+            rows.append({"factor": factor, "pair": pair, **found})
         tables.append(pd.DataFrame(rows).assign(p_holm=lambda table: holm(table["p"])))
     return pd.concat(tables, ignore_index=True)
+
+
+def _pair(differences: Floats, *, size: float, rng: np.random.Generator) -> dict[str, object]:
+    scaled = without_rounding_noise(differences / size)
+    (t, p), (low, high) = mean_test(scaled, rng=rng), interval_of(scaled)
+    n, mean, note = scaled.size, float(scaled.mean()), why_undefined(scaled)
+    found = {"n": n, "mean_difference": size * mean, "ci_low": size * low, "ci_high": size * high}
+    return found | {"t": t, "df": n - 1, "p": p, "d_z": t / np.sqrt(n), "note": note}
 
 
 def overall_mean(cells: pd.DataFrame) -> tuple[float, float, float]:
@@ -348,7 +326,7 @@ def overall_mean(cells: pd.DataFrame) -> tuple[float, float, float]:
         From `participant_cells`.
     """
     people = cells.groupby("participant_id")["mean"].mean().to_numpy(dtype=float)
-    return float(people.mean()), *t_interval(people)
+    return float(people.mean()), *interval_of(people)
 
 
 def in_order(level: object) -> tuple[bool, float, str]:

@@ -25,7 +25,13 @@ LONGEST_UPRIGHT = 6  # letters of a level that fit below their place
 
 
 def figure_factorial(
-    cells: pd.DataFrame, means: pd.DataFrame, *, factors: Sequence[str], label: str, simulated: bool
+    cells: pd.DataFrame,
+    means: pd.DataFrame,
+    *,
+    factors: Sequence[str],
+    label: str,
+    simulated: bool,
+    chance: float | None = None,
 ) -> Figure:
     """The first factor along x; a panel for each combination of the others.
 
@@ -41,6 +47,8 @@ def figure_factorial(
         Of the vertical axis, with its unit.
     simulated : bool
         Written into the figure.
+    chance : float, optional
+        Drawn as a dashed line.
     """
     first, *others = factors
     levels = list(dict.fromkeys(means[first]))
@@ -53,12 +61,14 @@ def figure_factorial(
     for ax, panel in zip(axes, panels, strict=False):
         own = [_panel_rows(table, panel) for table in (cells, means)]
         plot_levels(own[0], own[1], factor=first, levels=levels, simulated=simulated, ax=ax)
+        if chance is not None:
+            ax.axhline(chance, color=GREY, lw=1, ls="--", label="chance")
         ax.set_title(", ".join(f"{name} {level}" for name, level in panel.items()), loc="left")
     for ax in axes[len(panels) :]:
         ax.remove()
     for ax in axes[: len(panels) : columns]:
         ax.set_ylabel(label)
-    shared_legend(figure, axes[:1], ncols=2)
+    shared_legend(figure, axes[:1], ncols=2 if chance is None else 3)
     return figure
 
 

@@ -12,7 +12,6 @@ from numpy.testing import assert_allclose
 
 from tactileq.analysis.answers.plan import AnalysisPlan
 from tactileq.analysis.answers.responses import Responses
-from tactileq.analysis.chapters.oddity.dprime import oddity_d_prime
 from tactileq.analysis.chapters.oddity.section import (
     ODDITY_COLUMNS,
     oddity_section,
@@ -23,6 +22,7 @@ from tactileq.analysis.labels import ALL_TEXTURES, TASK_TITLES
 from tactileq.analysis.page.page import Table, table_html
 from tactileq.analysis.statistics.caveats import WITHHELD, Caveats
 from tactileq.analysis.statistics.claims import Values, claim_tests
+from tactileq.analysis.statistics.dprime import oddity_d_prime
 from tactileq.analysis.statistics.equivalence import DIFFERENT
 from tactileq.analysis.statistics.verdicts import ClaimFound
 from tactileq.modeling.files.answer_tables import ANSWER_TABLES

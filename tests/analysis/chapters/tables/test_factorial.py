@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
 from itertools import product
 
 import numpy as np
 import pandas as pd
 import pytest
+from pingouin import rm_anova
 
 from tactileq.analysis.chapters.tables.factorial import (
-    _few_factors,
-    _many_factors,
+    CompleteCells,
     cell_means,
     complete_cells,
     pairwise_tests,
@@ -41,12 +42,63 @@ def test_two_levels_are_a_paired_t_test() -> None:
     assert (row["df_effect"], row["df_error"], row["epsilon"]) == (1, 8, 1.0)
 
 
-def test_the_two_libraries_and_the_contrasts_agree() -> None:
+def test_another_library_agrees() -> None:
     values = np.random.default_rng(2).normal(size=(8, 3, 4))
     complete = complete_cells(cells_of(values), ["A", "B"])
-    few, many = _few_factors(complete.long, ["A", "B"]), _many_factors(complete)
-    assert list(few["effect"]) == list(many["effect"]) == ["A", "B", "A × B"]
-    pd.testing.assert_frame_equal(few, many, check_dtype=False, rtol=1e-8)
+    table = repeated_measures_anova(complete)
+    long = pd.DataFrame(
+        [(who, a, b, values[who, a, b]) for who, a, b in product(*map(range, values.shape))],
+        columns=["who", "A", "B", "mean"],
+    )
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "The inplace keyword", module="pingouin")
+        found = rm_anova(long, "mean", ["A", "B"], "who", correction=True, effsize="ng2")
+    assert list(table["effect"]) == ["A", "B", "A × B"]
+    for own, other in {
+        "F": "F",
+        "df_effect": "ddof1",
+        "df_error": "ddof2",
+        "p": "p_unc",
+        "epsilon": "eps",
+        "p_corrected": "p_GG_corr",
+        "generalized_eta_squared": "ng2",
+    }.items():
+        np.testing.assert_allclose(table[own], found[other], rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("effect", "df", "f", "p", "epsilon", "p_corrected"),
+    [
+        # R 4: anova(lm(y ~ 1), M = …, X = …, idata = …, test = "Spherical"); of one degree of
+        # freedom summary(aov(y ~ A * B * C * D + Error(s / (A * B * C * D)))).
+        ("C", (1, 5), 17.092, 0.009047, 1, 0.009047),
+        ("A × C", (1, 5), 8.6628, 0.03214, 1, 0.03214),
+        ("B × D", (4, 20), 0.58515, 0.677044, 0.5359, 0.584957),
+        ("A × B × C × D", (4, 20), 0.58631, 0.676251, 0.4986, 0.574007),
+    ],
+)
+def test_four_factors_as_in_r(effect, df, f, p, epsilon, p_corrected) -> None:
+    means = np.random.default_rng(3).normal(size=(6, 2, 3, 2, 3)).round(2)
+    levels = {name: tuple("012"[:k]) for name, k in zip("ABCD", means.shape[1:], strict=True)}
+    table = repeated_measures_anova(CompleteCells(tuple("abcdef"), levels, means, ()))
+    row = table.set_index("effect").loc[effect]
+    assert (row["df_effect"], row["df_error"]) == df
+    corrected = ["df_effect_corrected", "df_error_corrected"]
+    assert row[corrected].tolist() == [pytest.approx(epsilon * value, rel=1e-4) for value in df]
+    found = row[["F", "p", "epsilon", "p_corrected"]].tolist()
+    assert found == pytest.approx([f, p, epsilon, p_corrected], rel=1e-3)
+
+
+@pytest.mark.parametrize("unit", [1e-13, 1.0, 1e6])
+def test_a_constant_difference_has_no_f_in_any_unit(unit: float) -> None:
+    values = unit * (np.linspace(0, 1, 8)[:, None] + [0.3, 0.4])
+    complete = complete_cells(cells_of(values), ["A"])
+    assert np.isnan(repeated_measures_anova(complete).loc[0, "F"])
+    pair = pairwise_tests(complete, rng=np.random.default_rng(0)).iloc[0]
+    assert pair["mean_difference"] == pytest.approx(0.1 * unit)
+    # All 8 signs alike: 2 of 2⁸ patterns.
+    assert (pair["p"], pair["note"] != "") == (2 / 2**8, True)
+    assert np.isnan(pair["t"])
 
 
 def test_three_factors() -> None:

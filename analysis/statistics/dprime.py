@@ -9,10 +9,12 @@ from collections.abc import Callable
 from math import inf, sqrt
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri
 
 from tactileq.modeling import InputError
+from tactileq.modeling.arrays import Floats
 from tactileq.modeling.participants.choices import m_afc_share, oddity_share
 
 HIGHEST = 20.0  # where all shares are 1 to the last digit
@@ -26,6 +28,27 @@ def m_afc_d_prime(share: float, *, alternatives: int) -> float:
     return _inverse(
         lambda d: float(m_afc_share(d, alternatives=alternatives)), share, lowest=-HIGHEST
     )
+
+
+def yes_no_d_prime(
+    hits: ArrayLike, signals: ArrayLike, *, false_alarms: ArrayLike, noise: ArrayLike
+) -> Floats:
+    """d′ = z(H) − z(F) of one interval, two classes and two answers, corrected loglinearly.
+
+    Half an answer is added to hits and to false alarms, and one trial to either class, so that it
+    is finite (Hautus 1995).
+
+    Parameters
+    ----------
+    hits, false_alarms : array_like
+        Numbers of answers "signal" to either class.
+    signals, noise : array_like
+        Numbers of trials of either class; NaN where there is none.
+    """
+    s, n = np.asarray(signals, dtype=float), np.asarray(noise, dtype=float)
+    z_hits = ndtri((np.asarray(hits) + 0.5) / (s + 1))
+    z_false_alarms = ndtri((np.asarray(false_alarms) + 0.5) / (n + 1))
+    return np.where((s > 0) & (n > 0), z_hits - z_false_alarms, np.nan)
 
 
 def oddity_d_prime(share: float) -> float:

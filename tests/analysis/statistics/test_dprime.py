@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import norm
 
-from tactileq.analysis.chapters.oddity.dprime import (
+from tactileq.analysis.statistics.dprime import (
     d_primes,
     m_afc_d_prime,
     oddity_d_prime,
     same_different_d_prime,
     same_different_differencing_d_prime,
+    yes_no_d_prime,
 )
 from tactileq.modeling import InputError
 from tactileq.modeling.participants.choices import m_afc_share, oddity_share
@@ -160,3 +161,14 @@ def test_the_interval_holds_what_its_shares_hold(low, width, place):
 def test_no_interval_stays_none():
     assert all(math.isnan(d) for d in d_primes(math.nan, math.nan, of=oddity_d_prime))
     assert d_primes(-0.3, 1.4, of=oddity_d_prime) == (0.0, math.inf)
+
+
+def test_yes_and_no_have_the_difference_of_normal_quantiles():
+    # One participant with H = Φ(0.5) and F = Φ(−0.5), one all right, one without noise trials.
+    many = 10**7
+    hits = round(many * norm.cdf(0.5))
+    found = yes_no_d_prime(
+        [hits, 10, 3], [many, 10, 5], false_alarms=[many - hits, 0, 0], noise=[many, 10, 0]
+    )
+    # Hautus (1995): half a count and one trial more.
+    assert_allclose(found, [1.0, 2 * norm.ppf(10.5 / 11), math.nan], atol=1e-6)
