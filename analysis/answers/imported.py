@@ -17,7 +17,12 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from tactileq.analysis.answers.matrices import AnswerMatrix, answer_matrix, check_classes
+from tactileq.analysis.answers.matrices import (
+    AnswerMatrix,
+    answer_matrix,
+    check_classes,
+    expected_copies,
+)
 from tactileq.modeling import InputError
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import counted, shown
@@ -42,6 +47,7 @@ RESERVED = frozenset(
 )
 EXAMPLE = "correct=TYPE_ANS,factor=TYPE,participant=ID"
 RIGHT = {"1": 1.0, "0": 0.0, "true": 1.0, "false": 0.0}
+FEWEST_COPIES = 0.01  # expected number of equal matrices by chance, from which on they may be
 NO_ANSWER = frozenset({"na", "null", "."})  # what may be an answer of this name, or none
 
 Mask = npt.NDArray[np.bool_]
@@ -243,6 +249,7 @@ class _Found:
         self.left_out: dict[str, list[str]] = {}
         self.codes: Counter[str] = Counter()
         self.decided: list[str] = []
+        self.equal: list[str] = []
 
     def add(self, table: OtherTable) -> None:
         """Read one more table."""
@@ -302,25 +309,27 @@ class _Found:
         return presented, (*presented, *others)
 
     def check_copies(self, rows: pd.DataFrame) -> None:
-        """Refuse two files that hold the same, unless all their answers are alike anyway."""
-        first: dict[tuple[tuple[str, ...], ...], OtherTable] = {}
-        for table in self.tables:
+        """Refuse two files that hold the same, unless two participants may well have answered so.
+
+        They may where all answers of trials are alike, and where a matrix is likely to occur twice.
+        """
+        first: dict[tuple[tuple[str, ...], ...], int] = {}
+        for place, table in enumerate(self.tables):
             held = tuple(tuple(line.cells) for line in table.lines)
-            if held in first:
-                own = rows[rows["from_file"] == str(table.path)]
-                measure = "value" if self.mapping.value else "correct"
-                what = own[measure if measure in own else "answered"]
-                if what.nunique() > 1:
-                    raise InputError(
-                        f"expected different answers in each file, got the same in "
-                        f"{first[held].path} and {table.path}; leave one out, since a copy would "
-                        "count as another participant."
-                    )
-                self.decided.append(
-                    f"{first[held].path.name} and {table.path.name} hold the same; make sure that "
-                    "they are of two participants."
+            before = self.tables[first.setdefault(held, place)]
+            if before is table:
+                continue
+            own = rows[rows["from_file"] == str(table.path)]
+            measure = next(name for name in ("value", "correct", "answered") if name in own)
+            alike = own[measure].nunique() < 2
+            if self.matrices:
+                alike = expected_copies(self.matrices, place) > FEWEST_COPIES
+            if not alike:
+                raise InputError(
+                    f"expected different answers in each file, got the same in {before.path} and "
+                    f"{table.path}; leave one out, since a copy would count as another participant."
                 )
-            first.setdefault(held, table)
+            self.equal.append(f"{before.path.name} and {table.path.name}")
 
     def notes(self, rows: pd.DataFrame) -> tuple[str, ...]:
         """A sentence for each kind of lines left out, and for what was decided."""
@@ -331,6 +340,12 @@ class _Found:
         sentences.extend(self.labels.notes)
         sentences.extend(dict.fromkeys(self.decided))
         sentences.extend(_twice_over(self.tables))
+        if self.equal:
+            pairs = counted(len(self.equal), "pair")
+            sentences.append(
+                f"{pairs} of files that hold the same ({listed(self.equal)}); make sure that none "
+                "is a copy."
+            )
         if self.mapping.answered and self.mapping.presented:
             for word in sorted(set(rows["answered"]) - set(rows["presented"])):
                 times = int(rows.loc[rows["answered"] == word, "count"].sum())

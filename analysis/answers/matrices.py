@@ -17,7 +17,7 @@ from tactileq.modeling.errors import shown
 from tactileq.modeling.files.others.labels import Labels
 from tactileq.modeling.files.others.table import OtherTable
 
-FEWEST_CLASSES, MOST_CLASSES = 3, 16
+FEWEST_CLASSES, MOST_CLASSES = 2, 16
 Counts = npt.NDArray[np.int64]
 # As programs head sums of rows and columns (pandas, R, SPSS, spreadsheets).
 SUMS = frozenset(
@@ -160,9 +160,22 @@ def _check_square(table: OtherTable, presented: Sequence[str], answered: Sequenc
 
 
 def check_classes(classes: Sequence[str], where: str) -> None:
-    """Refuse fewer than three classes, or more than sixteen."""
+    """Refuse fewer than two classes, or more than sixteen."""
     if not FEWEST_CLASSES <= len(classes) <= MOST_CLASSES:
         raise InputError(
             f"expected {FEWEST_CLASSES} to {MOST_CLASSES} classes in {where}, got {len(classes)}; "
             "check the columns named in the map."
         )
+
+
+def expected_copies(matrices: Sequence[AnswerMatrix], place: int) -> float:
+    """How many participants are expected to have answered by chance as one of them did.
+
+    By how many of the other participants have the same count in each cell, as if cells were
+    independent; all who have the same matrix are no evidence for each other.
+    """
+    counts = np.array([matrix.counts for matrix in matrices])
+    same = counts == counts[place]
+    others = same[~same.all(axis=(1, 2))]
+    shares = (others.sum(axis=0) + 1) / (len(others) + 2)
+    return float(len(matrices) * np.prod(shares))

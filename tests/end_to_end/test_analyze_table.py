@@ -44,7 +44,8 @@ def test_matrices_are_drawn_for_each_condition(main, tmp_path: Path) -> None:
             (tmp_path / f"{person}_{level}.csv").write_text(text)
     files = sorted(path.name for path in tmp_path.glob("P*.csv"))
     done = main("analyze", "--table", *files, "--map", "factor=model")
-    assert (done.returncode, done.stderr) == (0, "")
+    assert done.returncode == 0
+    assert "5 pairs" in done.stderr  # of files that hold the same, which may be by chance
     counts = pd.read_csv(tmp_path / "analysis-results/tables/confusion_1.tsv", sep="\t")
     assert list(counts["count"]) == [9, 3, 0, 6, 12, 0, 3, 9, 0]
     assert "confusion_2" in (tmp_path / "analysis-results/report.html").read_text()

@@ -174,12 +174,16 @@ class OtherTable:
 
 def left_out_sentence(what: str, places: Sequence[str]) -> str:
     """That lines were left out, and why: `2 lines left out that repeat the header (line 9; …).`"""
-    more = f" and {len(places) - _MOST_PLACES} more" if len(places) > _MOST_PLACES else ""
     verb, _, rest = what.partition(" ")
     if len(places) == 1:
         what = f"{'has' if verb == 'have' else f'{verb}s'} {rest}"
-    there = "; ".join(places[:_MOST_PLACES]) + more
-    return f"{counted(len(places), 'line')} left out that {what} ({there})."
+    return f"{counted(len(places), 'line')} left out that {what} ({listed(places)})."
+
+
+def listed(places: Sequence[str]) -> str:
+    """The first few of some places, and how many more there are."""
+    more = f" and {len(places) - _MOST_PLACES} more" if len(places) > _MOST_PLACES else ""
+    return "; ".join(places[:_MOST_PLACES]) + more
 
 
 def number_of(name: str) -> int | None:

@@ -81,11 +81,11 @@ def test_a_matrix_has_its_condition_in_its_name(tmp_path: Path) -> None:
         ("A,N\n1,1.5\n", "correct=A,count=N", ["count", 0, "line 2"], 1.5),
         ("A,F\n1,\n", "correct=A,factor=F", ["F", "line 2"], "none"),
         ("A,F\n0.5,x\n0.5,X\n", "share=A,factor=F", "participant", ["P01", "line 3"]),
-        ("A,B\n1,2\n2,1\n", "presented=A,answered=B", ["3 to 16", "P01.csv"], 2),
+        ("A,B\n1,1\n1,1\n", "presented=A,answered=B", ["2 to 16", "P01.csv"], 1),
         (
             "A,B\n" + "".join(f"{i},{i}\n" for i in range(17)),
             "presented=A,answered=B",
-            ["3 to 16", "P01.csv"],
+            ["2 to 16", "P01.csv"],
             17,
         ),
         ("A,B\n1,1,1\n", "correct=A", ["2 cells", "line 2"], 3),
@@ -93,7 +93,7 @@ def test_a_matrix_has_its_condition_in_its_name(tmp_path: Path) -> None:
         ("A\n", "correct=A", "P01.csv", "1 line"),
         (b"A,F\n1,\xff\n", "correct=A,factor=F", ["UTF-8", "line 2"], "code pages"),
         ("x,a,b,c\na,1,1,1\nb,1,1,1\nd,1,1,1\n", "", "classes", ["a, b, c", "a, b, d"]),
-        ("x,a,b\na,1,1\nb,1,1\n", "", ["3 to 16", "P01.csv"], 2),
+        ("x,a\na,1\n", "", ["2 to 16", "P01.csv"], 1),
         ("x,a,b,c\na,1,1,1\nb,1,1,1\nc,1,1,1\n", "factor=model", "PARTICIPANT_model", "P01"),
     ],
 )
