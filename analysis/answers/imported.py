@@ -32,6 +32,7 @@ from tactileq.modeling.files.others.roles import parse_roles
 from tactileq.modeling.files.others.table import (
     OtherTable,
     left_out_sentence,
+    listed,
     read_other_table,
     same_name,
 )
