@@ -68,6 +68,8 @@ class TableMap:
     right : str
         The code in `correct` that means right, or the answer whose share is asked for where nothing
         was presented; empty where none is named.
+    decimal : str
+        The decimal sign; empty where the tables show it.
     """
 
     participant: str = ""
@@ -80,6 +82,7 @@ class TableMap:
     factors: tuple[str, ...] = ()
     where: dict[str, tuple[str, ...]] = field(default_factory=dict)
     right: str = ""
+    decimal: str = ""
 
     @property
     def is_matrix(self) -> bool:
@@ -156,6 +159,7 @@ def parse_map(
         factors=factors,
         where=found.where,
         right=found.right,
+        decimal=found.decimal,
     )
     _check_map(mapping)
     return mapping
@@ -211,7 +215,7 @@ def load_imported(files: Sequence[str | Path], mapping: TableMap) -> ImportedAns
     found = _Found(mapping)
     for path in files:
         table = read_other_table(Path(path), "a table of answers", wanted=mapping.wanted)
-        found.add(table)
+        found.add(replace(table, decimal=mapping.decimal))
     if mapping.is_matrix:
         found.check_matrices()
     rows = pd.concat(found.rows, ignore_index=True) if found.rows else pd.DataFrame()

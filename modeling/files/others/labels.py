@@ -51,7 +51,7 @@ class Labels:
         }
         every = [cell for cells in seen.values() for cell in cells]
         style = None
-        if every and all(map(is_number, every)) and fitting(every, separator=table.separator):
+        if every and all(map(is_number, every)) and fitting(every, decimal=table.decimal):
             style = table.numbers(columns)
         return [
             [

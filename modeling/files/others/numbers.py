@@ -76,23 +76,22 @@ class Numbers:
     ----------
     columns : mapping of str to list of str
         Cells by the name of their column; missing ones count for nothing.
-    separator : str
-        Of the cells. Between commas a point is a decimal point, unless numbers with commas say
-        otherwise: those with points for thousands would have to be quoted.
+    decimal : str
+        The decimal sign, where it is known; else both are tried.
     """
 
-    def __init__(self, columns: Mapping[str, Iterable[str]], *, separator: str) -> None:
+    def __init__(self, columns: Mapping[str, Iterable[str]], *, decimal: str = "") -> None:
         self.seen = {
             name: dict.fromkeys(cell for cell in cells if cell.casefold() not in NO_NUMBER)
             for name, cells in columns.items()
         }
-        self.separator = separator
+        self.decimal = decimal
 
     @cached_property
     def styles(self) -> list[Style]:
         """All that fit, the plainest first."""
         cells = [cell for column in self.seen.values() for cell in column]
-        return fitting(cells, separator=self.separator)
+        return fitting(cells, decimal=self.decimal)
 
     def within(self, others: Numbers) -> Numbers:
         """These numbers, by the styles that also fit others; by their own if none does."""
@@ -124,8 +123,8 @@ class Numbers:
             readings = " or ".join(style.describe(cell) for style in by_reading.values())
             raise InputError(
                 f"expected one reading of the numbers in column {shown(name)} of {path}, got "
-                f"{shown(cell)}, which is {readings}; export the table without separators of "
-                "thousands, and with a decimal point."
+                f"{shown(cell)}, which is {readings}; add decimal=point or decimal=comma to "
+                "--map."
             )
         return self.styles[0] if self.styles else self._nearest
 
@@ -150,18 +149,13 @@ def _possible(cells: Sequence[str]) -> list[Style]:
     )
 
 
-def fitting(cells: Sequence[str], *, separator: str) -> list[Style]:
+def fitting(cells: Sequence[str], *, decimal: str = "") -> list[Style]:
     """The styles of writing numbers that fit all cells, none of which is missing."""
-    if not cells:
-        return [PLAIN]
-    fits = [
+    return [
         style
-        for style in dict.fromkeys(_possible(cells))
-        if all(map(style.pattern.fullmatch, cells))
+        for style in dict.fromkeys(_possible(cells) if cells else [PLAIN])
+        if decimal in ("", style.decimal) and all(map(style.pattern.fullmatch, cells))
     ]
-    if separator == "," and not any("," in cell for cell in cells):
-        fits = [style for style in fits if style.decimal == "."] or fits
-    return fits
 
 
 def converted(cells: Sequence[str], style: Style) -> tuple[Floats, int]:

@@ -24,11 +24,17 @@ class Roles:
         Only rows with one of these values in a column count.
     right : str
         The code that means a right answer; empty where none is named.
+    decimal : str
+        The decimal sign of the numbers; empty where the tables show it.
     """
 
     columns: dict[str, list[str]] = field(default_factory=dict)
     where: dict[str, tuple[str, ...]] = field(default_factory=dict)
     right: str = ""
+    decimal: str = ""
+
+
+DECIMAL = {"point": ".", "comma": ","}
 
 
 def parse_roles(
@@ -42,8 +48,8 @@ def parse_roles(
 ) -> Roles:
     """Roles from `correct=hit,factor=model`, or from a file `roles.toml` with these keys.
 
-    A column whose name holds a comma may be in quotes; what follows a comma and is no role with =
-    belongs to the name before.
+    `decimal=comma` states the decimal sign. A column whose name holds a comma may be in quotes;
+    what follows a comma and is no role with = belongs to the name before.
 
     Parameters
     ----------
@@ -62,6 +68,7 @@ def parse_roles(
     InputError
         For another role, one of them twice, or a column twice in one role.
     """
+    roles = (*roles, "decimal")
     columns: dict[str, list[str]] = {}
     rows: dict[str, list[str]] = {}
     for text in texts:
@@ -82,7 +89,11 @@ def parse_roles(
             columns.setdefault(role, []).append(name)
     for column, value in where:
         rows.setdefault(column, []).append(value)
-    return Roles(columns, {column: tuple(values) for column, values in rows.items()}, right)
+    [sign] = columns.pop("decimal", [""])
+    if sign and sign not in DECIMAL:
+        raise InputError(f"expected decimal=point or decimal=comma, got {shown(sign)}; correct it.")
+    values_of = {column: tuple(values) for column, values in rows.items()}
+    return Roles(columns, values_of, right, DECIMAL.get(sign, ""))
 
 
 def is_file_of_roles(text: str) -> bool:

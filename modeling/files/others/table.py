@@ -59,6 +59,8 @@ class OtherTable:
     has_open_row_names : bool
         Whether each line has a blank cell more than the header, so that its first one may be a name
         of the row.
+    decimal : str
+        The decimal sign, where the user states it.
     """
 
     path: Path
@@ -70,6 +72,7 @@ class OtherTable:
     left_out: Mapping[str, list[int]] = field(default_factory=dict)
     numeric: tuple[int, ...] = ()
     has_open_row_names: bool = False
+    decimal: str = ""
 
     def where(self, line: Line) -> str:
         """Place of a line, for messages."""
@@ -125,7 +128,7 @@ class OtherTable:
         InputError
             If two ways fit and give other numbers.
         """
-        seen = Numbers({name: self.cells(name) for name in columns}, separator=self.separator)
+        seen = Numbers({name: self.cells(name) for name in columns}, decimal=self.decimal)
         if seen.open_cell:
             seen.within(self._of_others)
         return seen.style(self.path)
@@ -140,9 +143,9 @@ class OtherTable:
             for name, cells in columns.items()
             if any("." in c or "," in c for c in cells)
             and all(is_number(c) or c.casefold() in NO_NUMBER for c in cells)
-            and not Numbers({name: cells}, separator=self.separator).open_cell
+            and not Numbers({name: cells}).open_cell
         }
-        return Numbers(alone, separator=self.separator)
+        return Numbers(alone)
 
     def floats(self, name: str, style: Style, *, what: str = "a number") -> Floats:
         """The numbers of a column (n,), NaN where they are missing.
@@ -242,18 +245,18 @@ def read_other_table(
             f"{counted(len(lines), 'line')}; give a file that is not empty."
         )
     if is_declared:
-        _check_whole(lines[header:], path)
+        _check_whole(lines[header + 1 :], path, least=len(lines[header].cells), exact=True)
     table = _table(path, text, parsed.separator, lines, header=header)
     above = [line.number for line in lines[:header]]
     return replace(table, left_out={"stand above the header": above, **table.left_out})
 
 
-def _check_whole(lines: Sequence[Line], path: Path) -> None:
-    for line in lines[1:]:
-        if len(line.cells) != len(lines[0].cells):
+def _check_whole(lines: Sequence[Line], path: Path, *, least: int, exact: bool = False) -> None:
+    for line in lines:
+        if len(line.cells) < least or (exact and len(line.cells) > least):
             raise InputError(
-                f"expected {counted(len(lines[0].cells), 'cell')} in line {line.number} of {path}, "
-                f"got {len(line.cells)}; correct it, since the table is damaged."
+                f"expected {counted(least, 'cell')} in line {line.number} of {path}, got "
+                f"{len(line.cells)}; correct it, since the table is damaged."
             )
 
 
@@ -336,7 +339,7 @@ def _the_one(found: Sequence[_Parsed], refusal: InputError | None, path: Path) -
             "cells in quotes."
         )
     # A quote that is damaged by the separator of the header is told, not read by another one.
-    if refusal and not (wide and wide[0].has_names and wide[0].width > 1):
+    if refusal and not any(one.width > 1 for one in named):
         raise refusal
     return wide[0] if wide else max(named or found, key=lambda one: one.share)
 
@@ -350,10 +353,14 @@ def _table(
     if len(below) > 1 and any(c.casefold().startswith(_IMPORT_ID) for c in below[1].cells):
         left_out["explain columns (Qualtrics)"] = [line.number for line in below[:2]]
         below = below[2:]
-    again = [line.number for line in below if line.cells == names]
+    again = [line for line in below if names in (line.cells, line.cells[1:])]
     if again:
-        left_out["repeat the header"] = again
-        below = [line for line in below if line.cells != names]
+        left_out["repeat the header"] = [line.number for line in again]
+        below = [line for line in below if line not in again]
+    if len(names) > 1 and len(below) > 1 and _ends_table(below[-1]):
+        left_out["end the table"] = [below.pop().number]
+    if separator == " ":  # among blanks, no cell can be seen to be missing
+        _check_whole(below, path, least=len(names))
     check_spans(below, len(names), path)
     with_row_names = len(below) > 1 and all(len(line.cells) == len(names) + 1 for line in below)
     is_open = False
@@ -375,6 +382,13 @@ def _table(
         left_out=left_out,
         has_open_row_names=is_open,
     )
+
+
+def _ends_table(line: Line) -> bool:
+    """Whether a last line is no row: a word alone, or END OF FILE."""
+    words = " ".join(filter(None, line.cells))
+    alone = len(line.cells) == 1 and not is_number(words)
+    return alone or words.casefold() in ("end of file", "eof")
 
 
 def _full_line(line: Line, width: int, path: Path) -> Line:

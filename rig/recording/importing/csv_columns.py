@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -57,7 +57,8 @@ def parse_columns(texts: str | Sequence[str]) -> dict[str, str]:
             f"expected {', '.join(ROLES)} in the map of a recording, got where or right; remove "
             "them, since each line is a sample."
         )
-    return {name: columns[0] for name, columns in found.columns.items()}
+    named = {name: columns[0] for name, columns in found.columns.items()}
+    return named | ({"decimal": found.decimal} if found.decimal else {})
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +94,8 @@ def read_log(path: Path, named: Mapping[str, str], axis: Axis | None) -> CsvLog:
     Parameters
     ----------
     named : mapping of str to str
-        Columns by role, where their headers do not say it: by name, or by number (#3).
+        Columns by role, where their headers do not say it: by name, or by number (#3); and the
+        sign as `decimal`, where the numbers do not show it.
     axis : {"x", "y", "z", "dft321"}, optional
         Needed where there are several.
 
@@ -102,8 +104,10 @@ def read_log(path: Path, named: Mapping[str, str], axis: Axis | None) -> CsvLog:
     InputError
         For a column that is not there or is not sound, and units that differ.
     """
-    table = read_number_table(path, "a CSV file", wanted=tuple(named.values()), is_unit=_is_unit)
-    headers = _headers(table, named)
+    columns = {name: wanted for name, wanted in named.items() if name != "decimal"}
+    table = read_number_table(path, "a CSV file", wanted=tuple(columns.values()), is_unit=_is_unit)
+    table = replace(table, decimal=named.get("decimal", ""))
+    headers = _headers(table, columns)
     times = [place for place, name in headers.items() if role(name) == "time"]
     clocks = [place for place in times if place not in table.numeric]
     times = [place for place in times if place in table.numeric]
