@@ -26,7 +26,7 @@ from tactileq.rig.recording.importing.csv_columns import (
     read_columns,
     time_column,
 )
-from tactileq.rig.recording.importing.headers import OVERLOAD, known_unit
+from tactileq.rig.recording.importing.headers import OVERLOAD, is_acceleration, known_unit, role
 from tactileq.rig.recording.importing.labels import Label
 from tactileq.rig.recording.importing.plausible import G_PER_UNIT, doubts_about
 from tactileq.rig.recording.importing.times import TimeColumn
@@ -172,7 +172,9 @@ def import_csv_file(
     _check_unit(unit, "--unit")
     columns, warnings = read_columns(path, named or {})
     time = time_column(path, columns)
-    axes, found_unit = chosen_axes(path, columns, axis or only_axis_of(named or {}))
+    axis = axis or only_axis_of(named or {})
+    axes, found_unit = chosen_axes(path, columns, axis)
+    found_axis = "" if axis else _found_axis(path, columns)
     rows, gap = time.without_gaps(rate_hz) if time else (slice(None), "")
     _check_overload(path, axes, rows)
     axes, time = axes[:, rows], time and replace(time, values=time.values[rows])
@@ -191,7 +193,12 @@ def import_csv_file(
     taken_as = "g" if final_unit in VOLTS_PER_UNIT else final_unit
     return Imported(
         recording,
-        (*warnings, *filter(None, (gap, other_unit)), *uneven, *_too_short(path, recording)),
+        (
+            *warnings,
+            *filter(None, (found_axis, gap, other_unit)),
+            *uneven,
+            *_too_short(path, recording),
+        ),
         doubts=(*contradiction, *doubts_about(recording, path.name, unit=taken_as)),
     )
 
@@ -279,6 +286,17 @@ def _check_overload(path: Path, axes: Floats, rows: slice) -> None:
             f"an overload, {np.abs(axes[:, row]).max():.3g}, in row {row + 1} of the numbers; "
             "record again with a wider range."
         )
+
+
+def _found_axis(path: Path, columns: Mapping[str, Floats]) -> str:
+    """What was taken without being named, where there are other channels."""
+    channels = [name for name in columns if role(name) != "time"]
+    taken = "".join(filter(is_acceleration, channels))
+    return (
+        ""
+        if len(channels) == 1
+        else f"{path.name}: its only acceleration, {shown(taken)}, is taken."
+    )
 
 
 def _unit(path: Path, found: str, *, given: str | None) -> tuple[str, str]:
