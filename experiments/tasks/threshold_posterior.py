@@ -34,6 +34,10 @@ THRESHOLDS_DB: Floats = np.arange(-80.0, 31.0, 1.0)
 EXPECTED_DB, EXPECTED_SD_DB = -30.0, 15.0
 SLOPES = (1.0, 1.5, 2.2, 3.3, 5.0)
 LAPSE_RATES = (0.0, 0.02, 0.04, 0.06)  # shares that are wrong however strong the tone
+# Beyond what the prior assumes; if these explain the answers so many times better, a note says so
+# (docs/method/protocols.md#lapses).
+MORE_LAPSES = (0.08, 0.1, 0.12, 0.14, 0.16, 0.18, 0.2)
+NOTED_BAYES_FACTOR = 4.0
 CHANCE = 0.5
 # The level that is right in 75 % of trials without lapses lies so far from Weibull's scale, times
 # the slope: 1 − ½·exp(−(a/t)^slope) = ¾.
@@ -74,6 +78,9 @@ class Estimate:
     beyond : {"", "above", "below"}
         Whether the threshold is more likely than not above the highest level that the rig can
         present, or below the lowest that is asked; `level_db` is then that level, a bound.
+    more_lapses : bool
+        Whether more lapses than the prior assumes explain the person's answers much better:
+        `level_db` is then probably too high. Not of a bound.
     """
 
     frequency_hz: float
@@ -83,6 +90,7 @@ class Estimate:
     lapse_rate: float
     trials: int
     beyond: str = ""
+    more_lapses: bool = False
 
 
 # --- From rows of the table -----------------------------------------------------------------
@@ -161,11 +169,39 @@ def posterior(answers: Sequence[Answer], frequency_hz: float) -> Floats:
 
 def _log_weights(answers: Sequence[Answer]) -> Floats:
     """Logarithm of prior times likelihood; of a product, which might be too small a number."""
+    log_prior, log_likelihoods = _logs()
+    return np.asarray(log_prior + np.tensordot(_counts(answers), log_likelihoods))
+
+
+def _counts(answers: Sequence[Answer]) -> Floats:
+    """How many were right, and how many wrong, at each level."""
     counts = np.zeros((2, LEVELS_DB.size))
     for answer in answers:
         counts[int(not answer.correct), int(np.searchsorted(LEVELS_DB, answer.level_db))] += 1
-    log_prior, log_likelihoods = _logs()
-    return np.asarray(log_prior + np.tensordot(counts, log_likelihoods))
+    return counts
+
+
+def lapse_bayes_factor(answers: Sequence[Answer]) -> float:
+    """How many times better `MORE_LAPSES` explain a person's answers than `LAPSE_RATES` do.
+
+    The likelihood is averaged over the prior of the thresholds, over slopes and over lapse rates.
+    """
+    from scipy.special import logsumexp  # late: takes longer to load than all of modeling
+
+    log_prior, log_likelihoods = _logs_of_lapses()
+    threshold = _quest_plus().prior.get_axis_num("threshold")
+    logs = sum(
+        logsumexp(
+            log_prior
+            + np.tensordot(
+                _counts([a for a in answers if a.frequency_hz == frequency_hz]), log_likelihoods
+            ),
+            axis=threshold,
+        )
+        for frequency_hz in {a.frequency_hz for a in answers}
+    )
+    assumed, more = np.split(np.exp(logs - np.max(logs)), [len(LAPSE_RATES)], axis=-1)
+    return float(more.mean() / assumed.mean())
 
 
 def next_level_db(answers: Sequence[Answer], frequency_hz: float, *, highest_db: float) -> float:
@@ -236,6 +272,7 @@ def estimate(answers: Sequence[Answer], frequency_hz: float) -> Estimate:
         lapse_rate=mean["lapse"],
         trials=len(own),
         beyond=beyond,
+        more_lapses=not beyond and lapse_bayes_factor(answers) > NOTED_BAYES_FACTOR,
     )
 
 
@@ -266,6 +303,16 @@ def _logs() -> tuple[Floats, Floats]:
     likelihoods = made.likelihoods.transpose("response", "intensity", *made.prior.dims).values
     # A likelihood of 0 stays far below all others, and 0 times its logarithm is 0.
     return np.log(made.prior.values), np.log(np.maximum(likelihoods, 1e-300))
+
+
+@cache
+def _logs_of_lapses() -> tuple[Floats, Floats]:
+    """As `_logs`, with `MORE_LAPSES` behind `LAPSE_RATES`."""
+    log_prior, log_likelihoods = _logs()
+    right = np.exp(log_likelihoods[0, ..., :1])  # without lapses
+    # With the rate λ: 1 − λ − (½ − λ)·(1 − p), where p = 2·right − 1 is the share that is felt.
+    right = right - (2 * right - 1) * np.array([*LAPSE_RATES, *MORE_LAPSES])
+    return log_prior[..., :1], np.log(np.maximum([right, 1 - right], 1e-300))
 
 
 @cache

@@ -40,12 +40,16 @@ THRESHOLD_TABLE_COLUMNS = (
     Column("lapse_rate", description="Share of answers that do not depend on amplitude, mean"),
     Column("trials", description="Number of answers"),
     Column("people", description="Number of participants"),
-    Column("note", description="Where the threshold is only a bound; else n/a"),
+    Column(
+        "note",
+        description="Where the threshold is only a bound, or somebody lapsed too often; else n/a",
+    ),
 )
 BEYOND = {
     "above": "above the highest amplitude: a lower bound",
     "below": "below the lowest amplitude: an upper bound",
 }
+MORE_LAPSES = "more lapses than assumed: probably too high"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +84,7 @@ class MeanThreshold:
     slope, lapse_rate : float
         Means.
     note : str
-        Where somebody's threshold lay beyond what was presented.
+        Where somebody's threshold lay beyond what was presented, or somebody lapsed too often.
     """
 
     frequency_hz: float
@@ -178,9 +182,8 @@ def _mean(of: Sequence[Estimate]) -> MeanThreshold:
     count = len(of)
     sd_db = of[0].sd_db if count == 1 else float(levels_db.std(ddof=1))
     beyond = [BEYOND[one.beyond] for one in of if one.beyond]
-    notes = [
-        f"{beyond.count(sentence)} of {count} {sentence}" for sentence in dict.fromkeys(beyond)
-    ]
+    noted = [*beyond, *(MORE_LAPSES for one in of if one.more_lapses)]
+    notes = [f"{noted.count(sentence)} of {count} {sentence}" for sentence in dict.fromkeys(noted)]
     half_db = _factor(count) * sd_db
     mean_db = float(levels_db.mean())
     return MeanThreshold(
@@ -192,7 +195,7 @@ def _mean(of: Sequence[Estimate]) -> MeanThreshold:
         lapse_rate=float(np.mean([one.lapse_rate for one in of])),
         trials=sum(one.trials for one in of),
         people=count,
-        note="; ".join(notes) if count > 1 else "".join(beyond),
+        note="; ".join(notes) if count > 1 else "".join(noted),
     )
 
 
@@ -211,10 +214,12 @@ def _factor(count: int) -> float:
 def threshold_text(means: Sequence[MeanThreshold], *, people: int, simulated: bool) -> str:
     """The table as a TSV with its source and caveat; `Threshold.load` reads it."""
     who = f"{counted(people, 'person', 'people')}{' (simulated)' if simulated else ''}"
-    bounds = [f"{one.frequency_hz:g} Hz" for one in means if one.note]
+    bounds = [f"{one.frequency_hz:g} Hz" for one in means if one.interval_db is None]
     caveat = "measured with a pen held still; a stroking hand is less sensitive"
     if bounds:
         caveat += f"; at {', '.join(bounds)} only a bound (see note)"
+    if any(MORE_LAPSES in one.note for one in means):
+        caveat += "; strong tones were missed more often than the estimate assumes (see note)"
     notes = (
         f"# source: tactileq threshold, {who}: two-interval forced choice (QUEST+) of bursts of "
         f"{DURATION_S:g} s, 75 % correct, lapses excluded\n# caveat: {caveat}\n"

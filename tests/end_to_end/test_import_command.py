@@ -55,6 +55,23 @@ def test_provenance_within_provenance_is_kept_side_by_side(main, tmp_path: Path)
     ]
 
 
+def test_what_is_left_out_and_decided_stands_in_the_provenance(main, tmp_path: Path) -> None:
+    time_s = np.arange(2000) / 2000 + np.where(np.arange(2000) < 800, 0.0, 10.0)
+    rows = [f"{t!r},{x!r}" for t, x in zip(time_s.tolist(), NOISE[:2000, 0].tolist(), strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join(["time_s,z (raw)", *rows]) + "\n")
+    (tmp_path / "b.csv").write_text("nothing of use\n")
+    options = ["--force", 1, "--texture", "oak", "--unit", "g", "--out", "set"]
+    for changed in (("--speed", 100), ("--speed", 200, "--rate", 2000)):
+        added = main("import", "csv", "a.csv", "b.csv", *changed, *options)
+        assert added.returncode == 0, added.stderr
+        told = json.loads((tmp_path / "set/provenance.json").read_text())["settings"]["notes"]
+        for sentence, facts in zip(told, (["10 s", "row 800"], "'raw'", "b.csv"), strict=True):
+            check_refusal(sentence, names=facts)
+            assert sentence in added.stderr
+    for record in RecordingSet.load(tmp_path / "set").recordings:
+        assert record.samples.size == 1200
+
+
 def test_eighty_files_of_one_fault_give_one_warning(main, tmp_path: Path) -> None:
     time_s = np.arange(400) / 400 + np.random.default_rng(2).normal(0, 2e-4, 400)
     rows = [f"{t!r},{x!r}" for t, x in zip(time_s.tolist(), NOISE[:400, 0].tolist(), strict=True)]

@@ -93,13 +93,6 @@ class Numbers:
         cells = [cell for column in self.seen.values() for cell in column]
         return fitting(cells, decimal=self.decimal)
 
-    def within(self, others: Numbers) -> Numbers:
-        """These numbers, by the styles that also fit others; by their own if none does."""
-        both = [style for style in self.styles if style in others.styles]
-        if both and any(others.seen.values()):
-            self.__dict__["styles"] = both
-        return self
-
     @property
     def open_cell(self) -> tuple[str, str] | None:
         """Column and cell of a number that has several readings, if there is one."""

@@ -110,7 +110,7 @@ def split(text: Text, separator: str, path: Path, *, comments: bool = False) -> 
     physical = content.split("\n")
     if '"' not in content:
         every: Iterable[tuple[int, list[str]]] = (
-            (number, line.split(None if separator == " " else separator))
+            (number, _blanks(line) if separator == " " else line.split(separator))
             for number, line in enumerate(physical)
         )
     else:
@@ -125,6 +125,11 @@ def split(text: Text, separator: str, path: Path, *, comments: bool = False) -> 
         widths = tuple(len(line.split(separator)) for line in within)
         lines.append(Line(number + text.skipped + 1, stripped, widths))
     return lines
+
+
+def _blanks(line: str) -> list[str]:
+    """Cells between runs of blanks; what else is white, such as between thousands, is none."""
+    return list(filter(None, line.split(" ")))
 
 
 def _with_quotes(

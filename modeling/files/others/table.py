@@ -10,7 +10,6 @@ from __future__ import annotations
 import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from itertools import groupby, zip_longest
 from pathlib import Path
 from statistics import mode
@@ -129,23 +128,7 @@ class OtherTable:
             If two ways fit and give other numbers.
         """
         seen = Numbers({name: self.cells(name) for name in columns}, decimal=self.decimal)
-        if seen.open_cell:
-            seen.within(self._of_others)
         return seen.style(self.path)
-
-    @cached_property
-    def _of_others(self) -> Numbers:
-        """Numbers in all columns that hold nothing else, and are written in one way only."""
-        every = list(range(len(self.names)))
-        columns = {str(i): [line.cells[i] for line in self.lines] for i in every}
-        alone = {
-            name: cells
-            for name, cells in columns.items()
-            if any("." in c or "," in c for c in cells)
-            and all(is_number(c) or c.casefold() in NO_NUMBER for c in cells)
-            and not Numbers({name: cells}).open_cell
-        }
-        return Numbers(alone)
 
     def floats(self, name: str, style: Style, *, what: str = "a number") -> Floats:
         """The numbers of a column (n,), NaN where they are missing.

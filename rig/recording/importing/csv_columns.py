@@ -120,6 +120,8 @@ def read_log(path: Path, named: Mapping[str, str], axis: Axis | None) -> CsvLog:
             f"expected one unit for all axes of {path.name}, got "
             f"{shortened(' and '.join(sorted(units)))}; convert them."
         )
+    is_found = axis is None and len({*table.numeric} & {*headers} - {*times}) > 1
+    only = headers[axes[0]] if is_found else ""
     style = table.numbers([f"#{place + 1}" for place in (*times, *axes)])
     samples = np.array([_samples(table, place, style) for place in axes])
     every = [_time(table, place, headers[place], style) for place in times]
@@ -128,7 +130,9 @@ def read_log(path: Path, named: Mapping[str, str], axis: Axis | None) -> CsvLog:
         samples,
         units.pop(),
         tuple(headers.values()),
-        tuple(_warnings(table, taken={*times, *axes}, clocks=[headers[c] for c in clocks])),
+        tuple(
+            _warnings(table, taken={*times, *axes}, clocks=[headers[c] for c in clocks], only=only)
+        ),
     )
 
 
@@ -228,14 +232,16 @@ def _best(every: Sequence[TimeColumn]) -> TimeColumn | None:
     return next(iter((*whole, *in_part, *every)), None)
 
 
-def _warnings(table: OtherTable, *, taken: set[int], clocks: Sequence[str]) -> list[str]:
-    """What was left out, and a last number that may be cut short."""
+def _warnings(table: OtherTable, *, taken: set[int], clocks: Sequence[str], only: str) -> list[str]:
+    """What was left out, what was taken without being named, and a number that may be cut short."""
     name = table.path.name
     found = [
         f"{name}: {left_out_sentence(what, [f'line {n}' for n in numbers])}"
         for what, numbers in table.left_out.items()
         if numbers
     ]
+    if only:
+        found.append(f"{name}: its only acceleration, {shown(only)}, is taken.")
     if clocks:
         found.append(
             f"{name}: {shortened(', '.join(clocks))} is no column of numbers, and is not taken as "

@@ -9,7 +9,7 @@ import re
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 
-# As `_spelled` leaves them: without case, blanks, powers' signs and dots; µ is u.
+# As `known_unit` compares them: in small letters, without blanks, dots and signs of powers; µ is u.
 SPELLINGS: Mapping[str, Sequence[str]] = {
     "g": ("g", "gs", "g's", "gn", "g0", "gee", "g-force"),
     "mg": ("mg", "mgs", "mgn", "milli-g", "millig", "milli-gs", "milligs"),
@@ -29,15 +29,15 @@ SPELLINGS: Mapping[str, Sequence[str]] = {
     "ns": ("ns", "nsec", "nsecs", "nanos", "nanosecond", "nanoseconds"),
 }
 _UNITS = {spelling: unit for unit, spellings in SPELLINGS.items() for spelling in spellings}
-TIME_UNITS = ("s", "ms", "us", "ns")
+_TIME_UNITS = ("s", "ms", "us", "ns")
 TIME_NAMES = {"time", "t", "timestamp"}
 _BRACKETS = re.compile(r"[\[(]([^\[\]()]*(?:\([^()]*\))?[^\[\]()]*)[\])]")
 _BETWEEN = re.compile(r"\s+in\s+|\s*[/,]\s*|[\s_]+")  # a name and its unit: z in g, t/s, x_g
 _ACC = r"acc(?:el(?:eration|erometer)?)?"
 # x, ax, accx, linear_acceleration_x, x_axis, x_acceleration; gx is a gyroscope's, accuracy no y
-AXIS_NAME = re.compile(rf"(?:(?:a|.*{_ACC}|.*acc.*_)_?)?(?P<axis>[xyz])(?:_axis)?(?:_{_ACC})?")
+_AXIS_NAME = re.compile(rf"(?:(?:a|.*{_ACC}|.*acc.*_)_?)?(?P<axis>[xyz])(?:_axis)?(?:_{_ACC})?")
 _ACCELERATION = re.compile(rf"a_?[xyz]|(?:.*_)?{_ACC}(?:_.*|[xyz])?")
-ACCELERATION_UNITS = ("g", "mg", "m/s2")
+_ACCELERATION_UNITS = ("g", "mg", "m/s2")
 _MARKS = str.maketrans({**dict.fromkeys("−–‐‑", "-"), "’": "'", "μ": "u"})
 
 
@@ -86,7 +86,7 @@ def _time_or(name: str, unit: str) -> tuple[str, str]:
     if others:
         return name, unit
     written_out = known_unit(last) if len(last) > 2 else None
-    if not unit and written_out in TIME_UNITS:
+    if not unit and written_out in _TIME_UNITS:
         return "time", written_out
     return last, unit
 
@@ -96,14 +96,20 @@ def role(header: str) -> str | None:
     name = name_and_unit(header)[0]
     if name in TIME_NAMES:
         return "time"
-    axis = AXIS_NAME.fullmatch(name)
-    return axis["axis"] if axis else None
+    if axis := _AXIS_NAME.fullmatch(name):
+        return axis["axis"]
+    # S1_X (g): a unit of acceleration says what the name alone does not.
+    return name[-1] if re.fullmatch(r".*_[xyz]", name) and is_acceleration(header) else None
 
 
 def is_acceleration(header: str) -> bool:
-    """Whether a header tells an acceleration from other channels, by its unit or its name."""
+    """Whether a header tells an acceleration from other channels, by its unit or its name.
+
+    G of a magnetometer is gauss.
+    """
     name, unit = name_and_unit(header)
-    return unit in ACCELERATION_UNITS or _ACCELERATION.fullmatch(name) is not None
+    by_unit = unit in _ACCELERATION_UNITS and "mag" not in name
+    return by_unit or _ACCELERATION.fullmatch(name) is not None
 
 
 # --- Cells ----------------------------------------------------------------------------------

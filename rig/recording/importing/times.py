@@ -119,14 +119,17 @@ class TimeColumn:
 
         docs/method/recordings.md#gaps
         """
-        steps, breaks = self.steps(), _breaks(self.values)
+        breaks = _breaks(self.values)
+        if not breaks.size:
+            return slice(0, self.values.size), ""
+        steps = self.steps()
         ends = np.array([0, *(breaks + 1), self.values.size])
         longest = int(np.argmax(np.diff(ends)))
         rows = slice(int(ends[longest]), int(ends[longest + 1]))
         part = replace(self, values=self.values[rows])
         has_a_rate = part.has_a_rate()
         is_time = given_hz is not None and (part.agrees(given_hz) or (steps >= 0).all())
-        if not breaks.size or not (has_a_rate or is_time):
+        if not (has_a_rate or is_time):
             return slice(0, self.values.size), ""
         rate_hz = part.rate_hz() if has_a_rate else given_hz or np.nan
         worst = int(breaks[np.argmax(np.abs(steps[breaks]))])
@@ -252,9 +255,9 @@ def _breaks(values: Floats) -> NDArray[np.intp]:
     Time stamps may repeat and jump by whole ticks. No sample is missing at a single wrong stamp, or
     where one that came late is followed by others that came too soon.
     """
-    steps = np.diff(values)
+    steps = np.diff(values) if np.isfinite(values).all() else np.zeros(0)
     rising = np.sort(steps[steps > 0])
-    if not (np.isfinite(values).all() and rising.size):
+    if not rising.size:
         return np.array([], dtype=np.intp)
     typical = rising[(rising.size - 1) // 2]
     usual = np.abs(steps) <= LONGEST_GAP * typical
@@ -275,8 +278,8 @@ def _breaks(values: Floats) -> NDArray[np.intp]:
 
 def unwrapped(values: Floats) -> Floats:
     """Times of a counter that began at 0 again, as if it had gone on."""
-    steps = np.diff(values)
-    if not (np.isfinite(values).all() and (steps > 0).any()):
+    steps = np.diff(values) if np.isfinite(values).all() else np.zeros(0)
+    if not (steps > 0).any():
         return values
     longest = LONGEST_GAP * float(np.median(steps[steps > 0]))
     for counter in _COUNTERS:

@@ -117,8 +117,8 @@ def import_csv(
     """Add CSV recordings (time and one or three axes) to a recording set.
 
     Unevenly spaced samples, such as a phone's, are resampled at even intervals, unless --rate
-    states that they are even. Times since 1970 may be in s, ms, us or ns; for other times the
-    header names the unit.
+    states that they are even. Where times leave a gap or jump back, the longest part is taken.
+    Times since 1970 may be in s, ms, us or ns; for other times the header names the unit.
 
     Example: tactileq import csv run1.csv --speed 100 --force 1 --texture oak --axis dft321 --unit g
 

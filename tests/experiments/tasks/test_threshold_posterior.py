@@ -16,6 +16,7 @@ from tactileq.experiments.tasks.threshold_posterior import (
     EXPECTED_SD_DB,
     LAPSE_RATES,
     LEVELS_DB,
+    MORE_LAPSES,
     POINT_DB,
     SLOPES,
     THRESHOLDS_DB,
@@ -23,6 +24,7 @@ from tactileq.experiments.tasks.threshold_posterior import (
     Estimate,
     answers_of,
     estimate,
+    lapse_bayes_factor,
     next_level_db,
     posterior,
 )
@@ -213,6 +215,72 @@ def test_wrong_answers_far_above_the_threshold_are_lapses_up_to_a_point() -> Non
     # Lapses in a quarter of them are beyond the prior: the deviation tells, the level is wrong.
     lost = found_in([*near, *far, *[answer(10.0, False)] * 20])
     assert lost.sd_db > 2 * careful.sd_db
+    assert [found.more_lapses for found in (careful, careless, lost)] == [False, False, True]
+
+
+# --- More lapses than assumed ---------------------------------------------------------------
+
+
+def test_the_bayes_factor_is_that_of_likelihoods_written_out() -> None:
+    """Averaged over thresholds at two frequencies, one slope and one lapse rate."""
+    levels_db = (-10, -20, -30, -38, -36, -34, 0, 10)
+    here = [answer(db, db in (-10, -30, 0)) for db in levels_db]
+    there = [replace(answer(db, db % 3 == 0 or db > -20), frequency_hz=20.0) for db in levels_db]
+    prior = prior_of_thresholds() / prior_of_thresholds().sum()
+    evidence = {}
+    for rates in (LAPSE_RATES, MORE_LAPSES):
+        slope, rate, threshold = np.meshgrid(SLOPES, rates, THRESHOLDS_DB, indexing="ij")
+        shares = np.ones((len(SLOPES), len(rates)))
+        for answers in (here, there):
+            likelihood = np.ones(threshold.shape)
+            for one in answers:
+                undetected = np.exp(-(10 ** (slope * (one.level_db - threshold) / 20)))
+                right = 1 - rate - (0.5 - rate) * undetected
+                likelihood = likelihood * (right if one.correct else 1 - right)
+            shares = shares * (likelihood @ prior)
+        evidence[rates] = shares.mean()
+    expected = evidence[MORE_LAPSES] / evidence[LAPSE_RATES]
+    assert lapse_bayes_factor([*here, *there]) == pytest.approx(expected)
+    assert expected != pytest.approx(lapse_bayes_factor(here), rel=0.05)  # the others count
+
+
+def test_the_lapses_of_all_frequencies_count_at_each() -> None:
+    frequencies_hz = (20.0, 250.0, 1000.0)
+    near = [answer(-30.0, True), answer(-36.0, False)] * 10
+    far = [answer(db, number > 0) for db in (0.0, 10.0) for number in range(6)]
+    of_one = [*near, *far]
+    assert not estimate(of_one, 250.0).more_lapses
+    answers = [replace(one, frequency_hz=f) for f in frequencies_hz for one in of_one]
+    assert [estimate(answers, f).more_lapses for f in frequencies_hz] == [True] * 3
+
+
+def test_a_bound_is_no_matter_of_lapses() -> None:
+    far = [answer(level_db, n % 4 > 0) for level_db in (-10.0, 0.0, 10.0) for n in range(20)]
+    unfelt = [
+        replace(answer(db, n % 2 > 0), frequency_hz=20.0) for db in (10.0, 14.0) for n in range(40)
+    ]
+    found = [estimate([*far, *unfelt], f) for f in (20.0, 250.0)]
+    assert [(one.beyond, one.more_lapses) for one in found] == [("above", False), ("", True)]
+
+
+@pytest.mark.long("whole sessions of simulated observers")
+def test_observers_who_guess_often_are_noted_and_others_are_not() -> None:
+    def share_noted(lapse_rate: float) -> float:
+        noted = []
+        for seed in range(3):
+            rng = np.random.default_rng(seed)
+            answers: list[Answer] = []
+            correct = weibull(-30.0, lapse_rate=lapse_rate)
+            for _ in range(60):
+                for frequency_hz in (20.0, 40.0, 80.0, 160.0, 250.0, 400.0, 630.0, 1000.0):
+                    level_db = next_level_db(answers, frequency_hz, highest_db=HIGHEST_DB)
+                    right = bool(rng.random() < correct(level_db))
+                    answers.append(replace(answer(level_db, right), frequency_hz=frequency_hz))
+            noted.append(estimate(answers, 250.0).more_lapses)
+        return float(np.mean(noted))
+
+    assert share_noted(0.02) == 0.0
+    assert share_noted(0.15) > 0.5  # guesses in 30 % of trials
 
 
 # --- Rows -----------------------------------------------------------------------------------

@@ -78,6 +78,23 @@ def test_where_somebody_feels_nothing_the_mean_is_a_bound() -> None:
     assert high.level_db == -5.0
 
 
+def test_who_lapses_too_often_is_noted_beside_bounds() -> None:
+    people = {
+        "sub-01": {20.0: found(20.0, -30.0), 630.0: found(630.0, -10.0, more_lapses=True)},
+        "sub-02": {20.0: found(20.0, -32.0), 630.0: found(630.0, 0.0, beyond="above")},
+    }
+    low, high = mean_thresholds(people)
+    assert low.note == ""
+    assert high.note.startswith("1 of 2 above the highest amplitude")
+    assert "; 1 of 2 more lapses than assumed" in high.note
+    alone = mean_thresholds({"sub-01": people["sub-01"]})
+    assert [one.note[:12] for one in alone] == ["", "more lapses "]
+    assert alone[1].interval_db is not None
+    text = threshold_text(alone, people=1, simulated=True)
+    assert "strong tones were missed more often" in text
+    assert "only a bound" not in text
+
+
 def test_one_frequency_is_no_table() -> None:
     with refused(InputError, expected="frequencies", got=1):
         mean_thresholds({"sub-01": {20.0: found(20.0, -30.0)}})

@@ -372,8 +372,10 @@ def test_the_only_acceleration_is_found_among_other_channels(
         with refused(InputError, expected="--axis", got=["x (dps)", "z (mg)"]):
             import_csv_file(path, LABEL)
         return
-    found = import_csv_file(path, LABEL).recording
-    assert np.corrcoef(found.samples, axes[1])[0, 1] == pytest.approx(1)
+    found = import_csv_file(path, LABEL)
+    assert np.corrcoef(found.recording.samples, axes[1])[0, 1] == pytest.approx(1)
+    assert f"'{header.split(',')[2]}'" in found.warnings[0]
+    assert not import_csv_file(path, LABEL, named={"y": header.split(",")[2]}).warnings
 
 
 def test_what_instruments_send_for_an_overload_is_named(

@@ -89,7 +89,15 @@ def test_roles(header: str, expected: str | None) -> None:
 def test_accelerations_are_told_from_other_channels() -> None:
     for header in ("aX", "Acceleration", "lin_acc_z", "ch1 (mg)", "y (m/s²)"):
         assert is_acceleration(header)
-    for header in ("x", "gX", "accuracy", "gyro_x (rad/s)", "temperature (C)", "ch1 (V)"):
+    for header in (
+        "x",
+        "gX",
+        "accuracy",
+        "gyro_x (rad/s)",
+        "temperature (C)",
+        "ch1 (V)",
+        "mag_x (G)",
+    ):
         assert not is_acceleration(header)
 
 
