@@ -259,6 +259,7 @@ class _Found:
     def add(self, table: OtherTable) -> None:
         """Read one more table."""
         self.tables.append(table)
+        self.decided.extend(table.decided)
         for what, numbers in table.left_out.items():
             self.leave_out(what, [f"{table.path.name}, line {number}" for number in numbers])
         if self.mapping.is_matrix:

@@ -58,7 +58,6 @@ def answer_matrix(table: OtherTable, *, labels: Labels) -> AnswerMatrix:
         column, and sums that are not.
     """
     used = [i for i, name in enumerate(table.names) if i and name]
-    _check_unnamed(table)
     answered = [labels("class", table.text_of(table.names[i], table.lines[0])) for i in used]
     rows = [line for line in table.lines if any(line.cells)]
     presented = [labels("class", table.text_of(line.cells[0], line)) for line in rows]
@@ -90,16 +89,6 @@ def _counts(table: OtherTable, columns: Sequence[int]) -> Counts:
             f"{shown(line.cells[columns[column]])}; give the number of answers."
         )
     return np.asarray(values, dtype=np.int64)
-
-
-def _check_unnamed(table: OtherTable) -> None:
-    for i, name in enumerate(table.names):
-        held = [line for line in table.lines if line.cells[i]]
-        if i and not name and held:
-            raise InputError(
-                f"expected a class above each count in {table.path}, line {table.header_line}, got "
-                f"none above {shown(held[0].cells[i])} in line {held[0].number}; name it."
-            )
 
 
 def _without_sums(

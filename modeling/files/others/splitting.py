@@ -51,11 +51,14 @@ class Line:
     widths : tuple of int
         Where quoted cells hold line ends: how many cells each line of the file would have if quotes
         meant nothing.
+    given : int
+        How many cells the line has in the file, where others were added; else 0.
     """
 
     number: int
     cells: list[str]
     widths: tuple[int, ...] = ()
+    given: int = 0
 
     @property
     def width(self) -> int:
@@ -163,9 +166,7 @@ def _with_quotes(
 def check_spans(lines: Sequence[Line], width: int, path: Path) -> None:
     """Refuse a quoted cell that runs over lines which would be whole ones without its quotes."""
     for line in lines:
-        swallowed = [own == width for own in line.widths[1:]]
-        every = line.widths[:1] == (width,) and all(swallowed)
-        if swallowed and (every or (any(swallowed) and width > 3)):
+        if line.widths and min(line.widths[0], line.widths[-1]) >= width:
             raise InputError(
                 f"expected one reading of {path}, line {line.number}, got a quote that either "
                 f"holds a cell of {len(line.widths)} lines or was not closed, so that lines are "

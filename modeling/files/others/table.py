@@ -60,6 +60,8 @@ class OtherTable:
         of the row.
     decimal : str
         The decimal sign, where the user states it.
+    decided : tuple of str
+        What was decided where another reading is possible, a sentence each.
     """
 
     path: Path
@@ -72,6 +74,7 @@ class OtherTable:
     numeric: tuple[int, ...] = ()
     has_open_row_names: bool = False
     decimal: str = ""
+    decided: tuple[str, ...] = ()
 
     def where(self, line: Line) -> str:
         """Place of a line, for messages."""
@@ -108,6 +111,13 @@ class OtherTable:
         """Cells of a column, from top to bottom."""
         place = self.place(name)
         self._check_row_names(place)
+        for line in self.lines:
+            if 0 < line.given <= place:
+                raise InputError(
+                    f"expected {counted(len(self.names), 'cell')} in {self.where(line)}, got "
+                    f"{line.given} and none for {shown(name)}; complete the line, or remove it if "
+                    "it is none of the table."
+                )
         return [line.cells[place] for line in self.lines]
 
     def _check_row_names(self, place: int) -> None:
@@ -304,7 +314,8 @@ def _parsed(
         try:
             lines = split(text, separator, path, **options)
         except InputError as error:
-            refusal = refusal or (error if separator != " " else None)
+            if separator != " " or not (found or refusal):
+                refusal = refusal or error
             continue
         header = header_in(lines)
         found.append(_Parsed(separator, lines, header or 0, header is not None))
@@ -336,7 +347,9 @@ def _table(
     if len(below) > 1 and any(c.casefold().startswith(_IMPORT_ID) for c in below[1].cells):
         left_out["explain columns (Qualtrics)"] = [line.number for line in below[:2]]
         below = below[2:]
-    again = [line for line in below if names in (line.cells, line.cells[1:])]
+    again = [
+        line for line in below if _trimmed(names) in map(_trimmed, (line.cells, line.cells[1:]))
+    ]
     if again:
         left_out["repeat the header"] = [line.number for line in again]
         below = [line for line in below if line not in again]
@@ -345,15 +358,15 @@ def _table(
     if separator == " ":  # among blanks, no cell can be seen to be missing
         _check_whole(below, path, least=len(names))
     check_spans(below, len(names), path)
-    with_row_names = len(below) > 1 and all(len(line.cells) == len(names) + 1 for line in below)
     is_open = False
-    if with_row_names:
-        first = [line.cells[0] for line in below]
-        if not any(line.cells[-1] for line in below):
-            is_open = len(set(first)) == len(first) and separator in "\t "
-        elif separator in "\t " and len(set(first)) == len(first):
+    decided: tuple[str, ...] = ()
+    if below and all(len(line.cells) == len(names) + 1 for line in below):
+        may_be_names = _may_be_row_names([line.cells[0] for line in below])
+        is_open = may_be_names and not any(line.cells[-1] for line in below)
+        if may_be_names and not is_open and separator in "\t " and len(below) > 1:
             names = ["", *names]
-            left_out["begin with the name of their row, which has no column"] = []
+            decided = (f"{path.name}: the first cell of each line is taken as the name of a row.",)
+    _check_lengths(below, names, path)
     full = [_full_line(line, len(names), path) for line in below]
     return OtherTable(
         path,
@@ -364,7 +377,52 @@ def _table(
         lines[header].number,
         left_out=left_out,
         has_open_row_names=is_open,
+        decided=decided,
     )
+
+
+def _trimmed(cells: Sequence[str]) -> list[str]:
+    """Cells up to the last one that is not blank."""
+    return list(cells[: Line(0, list(cells)).width])
+
+
+def _may_be_row_names(cells: Sequence[str]) -> bool:
+    """Whether cells are all different, and numbers only if they count the rows, as in R."""
+    counted_up = [str(number) for number in range(1, len(cells) + 1)]
+    return len(set(cells)) == len(cells) and (
+        list(cells) == counted_up or not any(map(is_number, cells))
+    )
+
+
+def _check_lengths(lines: Sequence[Line], names: Sequence[str], path: Path) -> None:
+    """Refuse lines of other lengths, unless the program leaves out blank cells at their ends.
+
+    A cell too many, even a blank one, tells a separator within a cell; one too few, a line end.
+    """
+    lengths = [len(line.cells) for line in lines]
+    most = max(lengths, default=0)
+    short = [line for line in lines if len(line.cells) < most]
+    ends_blank = any(len(line.cells) == most and not line.cells[-1] for line in lines)
+    if most > len(names) and short:
+        wrong = next(line for line in lines if len(line.cells) > len(names))
+        raise InputError(
+            f"expected {counted(len(names), 'cell')} in {path}, line {wrong.number}, as its header "
+            f"has, got {len(wrong.cells)}; put cells that hold the separator in quotes, or name "
+            "all columns."
+        )
+    if short and (ends_blank or short == list(lines[-1:])):
+        raise InputError(
+            f"expected {counted(most, 'cell')} in {path}, line {short[0].number}, as in other "
+            f"lines, got {len(short[0].cells)}: either a line that was cut, or one that is no row; "
+            "complete or remove it."
+        )
+    for place, name in enumerate(names):
+        held = [line for line in lines if place < len(line.cells) and line.cells[place]]
+        if place and not name and held:
+            raise InputError(
+                f"expected a name above each column in {path}, got none above "
+                f"{shown(held[0].cells[place])} in line {held[0].number}; name it."
+            )
 
 
 def _ends_table(line: Line) -> bool:
@@ -382,7 +440,7 @@ def _full_line(line: Line, width: int, path: Path) -> Line:
             f"got {line.width}; put cells that hold the separator in quotes, or name all columns."
         )
     cells = [*line.cells[:width], *[""] * (width - len(line.cells))]
-    return replace(line, cells=cells)
+    return replace(line, cells=cells, given=len(line.cells))
 
 
 # --- Tables of numbers -----------------------------------------------------------------------

@@ -29,6 +29,19 @@ HEADERS = (
 )
 SEPARATORS = ("\t", ";", ",", "|", " ")
 THOUSANDS = ("", "", "", ",", ".", "'", "\u00a0")
+PREAMBLE = "Model: logger, v1.2\n\nStart;2026-01-01,12:00\n#note 5\n"
+RAW = -1  # cells are joined as they are: what holds a separator or a quote is damaged
+REMARKS = (
+    "fine",
+    "too rough, really",
+    "",
+    "3,5",
+    '"too',
+    'rough"',
+    "a; b",
+    '5" wide',
+    "two\nlines",
+)
 BOOLS = (("0", "1"), ("false", "true"), ("FALSE", "TRUE"), ("False", "True"), ("wrong", "hit"))
 
 
@@ -54,23 +67,28 @@ class Dialect:
     bools: tuple[str, str]
     line_end: str
     encoding: str
-    preamble: int
+    preamble: str
     extras: list[str]
     row_names: bool
     says_separator: bool
     repeats_header: bool
     ends: str
+    trailing: str
+    blanks: str
 
     @property
     def is_unambiguous(self) -> bool:
         """Whether docs/method/tables.md#dialects calls it so."""
-        own_sign = self.decimal != self.separator or self.quoting != csv.QUOTE_NONE
+        if self.quoting == RAW or self.trailing == "rows" or self.ends.startswith("\nTotal"):
+            return False
         usual = self.thousands in ("", "'", "\u00a0") and (
             self.digits != 3 or self.separator == ","
         )
+        if self.quoting == csv.QUOTE_NONE and self.extras:
+            return False
         not_blanks = self.separator != " " or self.quoting == csv.QUOTE_ALL
         is_text = self.encoding != "cp1252"
-        return own_sign and usual and not_blanks and is_text and not self.row_names
+        return usual and not_blanks and is_text and not self.row_names
 
 
 def drawn_truth(rng: random.Random) -> Truth:
@@ -98,17 +116,19 @@ def drawn_dialect(rng: random.Random) -> Dialect:
         decimal=decimal,
         thousands=rng.choice([sign for sign in THOUSANDS if sign != decimal]),
         digits=rng.randint(0, 4),
-        quoting=rng.choice((csv.QUOTE_MINIMAL, csv.QUOTE_ALL, csv.QUOTE_NONE)),
-        missing=rng.choice(("", "", "NaN", "n/a")),
+        quoting=rng.choice((csv.QUOTE_MINIMAL, csv.QUOTE_ALL, csv.QUOTE_NONE, RAW)),
+        missing=rng.choice(("", "", "NaN", "n/a", "NA", "null", "None", ".", "-nan(ind)")),
         bools=rng.choice(BOOLS),
         line_end=rng.choice(("\n", "\r\n", "\r")),
         encoding=rng.choice(("utf-8", "utf-8", "utf-8-sig", "utf-16", "cp1252")),
-        preamble=rng.choice((0, 0, 0, 1, 3)),
+        preamble=rng.choice(("", "", "", "Exported by a program\n", PREAMBLE)),
         extras=rng.sample(("note", "n.a.", "date", "rt", "rt"), rng.randint(0, 3)),
         row_names=rng.random() < 0.1,
         says_separator=rng.random() < 0.1,
         repeats_header=rng.random() < 0.1,
-        ends=rng.choice(("", "\n", "\n\n", "\nEND OF FILE\n")),
+        ends=rng.choice(("", "\n", "\n\n", "\nEND OF FILE\n", "\nTotal,12;3\n")),
+        trailing=rng.choice(("", "", "", "rows", "all")),
+        blanks=rng.choice(("", "", "", "", "after", "around")),
     )
 
 
@@ -141,28 +161,47 @@ def written(truth: Truth, dialect: Dialect, names: Sequence[str], rng: random.Ra
             text, exact = number(measured, dialect, dialect.digits)
             truth.trials[place] = (who, levels, exact)
             cells.append(text)
-        cells += [rng.choice(("fine", "too rough, really", "", "3,5")) for _ in dialect.extras]
+        cells += [rng.choice(REMARKS) for _ in dialect.extras]
         rows.append([cells[i] for i in order])
     lines = [[header[i] for i in order], *rows]
     if dialect.repeats_header and len(lines) > 3:
         lines.insert(3, lines[0])
     if dialect.row_names:
         lines[1:] = [[str(i), *cells] for i, cells in enumerate(lines[1:], 1)]
+    if dialect.trailing:
+        first = 1 if dialect.trailing == "rows" else 0
+        lines[first:] = [[*cells, ""] for cells in lines[first:]]
+    around = {"": "", "after": " ", "around": "  "}[dialect.blanks]
+    if dialect.quoting == RAW:
+        joined = (dialect.separator + around).join
+        table = "".join(f"{joined(cells)}\n" for cells in lines)
+    else:
+        try:
+            table = quoted(lines, dialect)
+        except csv.Error:
+            return None  # a cell that has to be quoted
+    if dialect.ends.startswith("\nTotal") and len(header) < 3:
+        return None  # which would be a row
+    said = f"sep={dialect.separator}\n" if dialect.says_separator else ""
+    return said + dialect.preamble + table.removesuffix("\n") + dialect.ends
+
+
+def quoted(lines: Sequence[Sequence[str]], dialect: Dialect) -> str:
     sheet = io.StringIO()
+    none = dialect.quoting == csv.QUOTE_NONE
     writer = csv.writer(
         sheet,
         delimiter=dialect.separator,
-        quoting=dialect.quoting,
-        quotechar='"' if dialect.quoting != csv.QUOTE_NONE else None,
+        quoting=csv.QUOTE_NONE if none else csv.QUOTE_MINIMAL,
+        quotechar=None if none else '"',
         lineterminator="\n",
     )
-    try:
-        writer.writerows(lines)
-    except csv.Error:
-        return None  # a cell that has to be quoted
-    said = f"sep={dialect.separator}\n" if dialect.says_separator else ""
-    before = "Exported by a program\n" * dialect.preamble
-    return said + before + sheet.getvalue().removesuffix("\n") + dialect.ends
+    if dialect.quoting == csv.QUOTE_ALL:
+        writer = csv.writer(
+            sheet, delimiter=dialect.separator, quoting=csv.QUOTE_ALL, lineterminator="\n"
+        )
+    writer.writerows(lines)
+    return sheet.getvalue()
 
 
 def expected(truth: Truth) -> list[tuple[object, ...]]:
@@ -187,11 +226,11 @@ def check_read_or_refused(folder: Path, seed: int) -> tuple[bool, bool]:
         return False, False
     path = folder / "table.csv"
     path.write_bytes(data)
-    quoted = [f'"{name.replace(chr(34), chr(34) * 2)}"' for name in names]
-    roles = ["participant=subject", *(f"factor={name}" for name in quoted[:-1])]
+    named = [f'"{name.replace(chr(34), chr(34) * 2)}"' for name in names]
+    roles = ["participant=subject", *(f"factor={name}" for name in named[:-1])]
     right = dialect.bools[1] if dialect.bools[1] == "hit" and truth.measure == "correct" else ""
     try:
-        mapping = parse_map([*roles, f"{truth.measure}={quoted[-1]}"], right=right)
+        mapping = parse_map([*roles, f"{truth.measure}={named[-1]}"], right=right)
         found = load_imported([path], mapping)
     except InputError as refusal:
         said = str(refusal)
