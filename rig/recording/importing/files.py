@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from warnings import warn
 
 import numpy as np
 
@@ -143,9 +144,11 @@ def import_csv(
 
 
 def _meant(one: Imported) -> Recording:
-    """The recording; refused where something about it is implausible."""
+    """The recording, with its warnings; refused where something about it is implausible."""
     if one.doubts:
         raise InputError(one.doubts[0])
+    for sentence in one.warnings:
+        warn(sentence, stacklevel=4)
     return one.recording
 
 
