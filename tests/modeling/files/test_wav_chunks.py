@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,11 +10,14 @@ from typing import Literal
 
 import numpy as np
 import pytest
+import soundfile
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from tactileq.modeling import InputError
-from tactileq.modeling.files.wav import read_wav_channels
+from tactileq.modeling import InputError, Recording, RecordingSet
+from tactileq.modeling.files.wav import mended_wav, read_wav, read_wav_channels, samples_only
+from tactileq.modeling.recordings.appending import WavSource, append
+from tests.refusals import check_refusal, refused, warned
 
 OPEN = (0xFFFFFFFF, 0x7FFFF000, 0x80000000)
 COUNTED = (36, 44)
@@ -112,8 +116,6 @@ class Written:
         plain = replace(self, before=(), after=(), data_size=right, riff_size=right)
         form = "RIFX" if self.form == "RIFX" else "RIFF"
         path.write_bytes(replace(plain, form=form, is_padded=True).bytes()[0])
-        import soundfile
-
         return soundfile.read(path, dtype="float64", always_2d=True)[0]
 
 
@@ -195,3 +197,114 @@ def test_all_samples_of_the_file_or_a_refusal(
         assert told, "expected to be told of a wrong header"
     if there < file.frames:
         assert size in OPEN or size <= held or length + 8 in (len(cut), len(cut) - 1)
+
+
+# --- Single cases ---------------------------------------------------------------------------------
+
+
+def written(path: Path, file: Written, *, cut_to: int | None = None) -> tuple[Path, np.ndarray]:
+    truth = file.truth(path)
+    path.write_bytes(file.bytes()[0][:cut_to])
+    return path, truth
+
+
+@pytest.mark.parametrize("before", [(), ("LIST", "bext"), ("JUNK", "FLLR")])
+@pytest.mark.parametrize(
+    ("data_size", "riff_size"),
+    [(none, none), (none, lower), (lower, lower), (right, none)]
+    + [(SIZES[i], SIZES[i]) for i in range(3, 8)],
+)
+@pytest.mark.parametrize("after", [(), ("LIST",)])
+def test_wrong_headers_of_whole_files(
+    tmp_path: Path, before: tuple[str, ...], data_size: Sizes, riff_size: Sizes, after: tuple[str]
+) -> None:
+    file = Written(before=before, after=after, data_size=data_size, riff_size=riff_size)
+    path, truth = written(tmp_path / "a.wav", file)
+    samples, told = read(path)
+    assert np.array_equal(samples, truth)
+    assert len(told) == (data_size is not right)
+    for sentence in told:
+        check_refusal(sentence, names=["a.wav", "header", "500 samples"])
+
+
+@pytest.mark.parametrize("form", ["RIFF", "RIFX", "RF64", "BW64"])
+def test_cut_files_are_refused(tmp_path: Path, form: str) -> None:
+    path, _ = written(tmp_path / "a.wav", Written(form=form), cut_to=640)
+    with refused(InputError, expected=[path, "500 samples"], got=["640 bytes", "truncated"]):
+        read_wav(path)
+    with refused(InputError, expected=path, got="truncated"):
+        samples_only(path.read_bytes(), path)
+
+
+def test_a_cut_file_whose_own_size_is_right_is_told_of(tmp_path: Path) -> None:
+    file = Written(riff_size=lambda size: 644 - 8)
+    path, truth = written(tmp_path / "a.wav", file, cut_to=644)
+    with warned(names=["a.wav", "500 samples", "300 samples"]):
+        samples, _ = read_wav(path)
+    assert np.array_equal(samples, truth[:300, 0])
+
+
+@pytest.mark.parametrize("size", [right, none, SIZES[3]])
+def test_a_file_without_samples_is_refused(tmp_path: Path, size: Sizes) -> None:
+    path, _ = written(tmp_path / "a.wav", Written(frames=0, data_size=size))
+    with refused(InputError, expected=path, got=["none", "header"]):
+        read_wav(path)
+
+
+@pytest.mark.parametrize("sound", [b"LIST\xff\xff\0\0", b"LIST\4\0\0\0INFO", b"abcd\2\0\0\0xy"])
+def test_samples_that_look_like_a_chunk(tmp_path: Path, sound: bytes) -> None:
+    """Behind the end that a stale header gives them."""
+    noise = Written(frames=400).data
+    file = Written(samples=noise[:400] + sound + noise[400:], data_size=lambda size: 400)
+    path, truth = written(tmp_path / "a.wav", replace(file, riff_size=lambda size: 436))
+    try:
+        samples, told = read(path)
+    except InputError as error:
+        check_refusal(str(error), expected=path, got=["LIST"])
+    else:
+        assert np.array_equal(samples, truth)
+        assert told
+
+
+@pytest.mark.parametrize("is_padded", [True, False])
+@pytest.mark.parametrize("after", [(), ("LIST",), ("id3", "Zzzz")])
+def test_odd_samples(tmp_path: Path, is_padded: bool, after: tuple[str, ...]) -> None:
+    file = Written(bits=24, frames=501, after=after, is_padded=is_padded)
+    if not is_padded:
+        file = replace(file, after=after[:1])
+    path, truth = written(tmp_path / "a.wav", file)
+    samples, told = read(path)
+    assert np.array_equal(samples, truth)
+    assert not told
+
+
+def test_a_chunk_behind_the_samples_that_is_cut(tmp_path: Path) -> None:
+    file = Written(after=("LIST",))
+    path, truth = written(tmp_path / "a.wav", file, cut_to=len(file.bytes()[0]) - 5)
+    assert np.array_equal(read(path)[0], truth)
+    longer = bytearray(file.bytes()[0])
+    longer[-19] = 200  # its size alone
+    path.write_bytes(longer)
+    assert np.array_equal(read(path)[0], truth)
+
+
+def test_what_is_imported_reads_the_same_from_its_copy(tmp_path: Path) -> None:
+    path, truth = written(tmp_path / "a.wav", Written(data_size=none, before=("JUNK",)))
+    assert mended_wav(path) is not None
+    record = Recording(truth[:, 0], 8000.0, 100.0, 1.0, "felt")
+    append(tmp_path / "set", RecordingSet([record]), [WavSource(path)])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        (again,) = RecordingSet.load(tmp_path / "set").recordings
+    assert np.array_equal(again.samples, truth[:, 0])
+    assert soundfile.info(tmp_path / "set/0001.wav").frames == 500
+    right_file, _ = written(tmp_path / "b.wav", Written(before=("JUNK",)))
+    assert mended_wav(right_file) is None
+
+
+def test_samples_alone_of_a_file_that_was_never_closed(tmp_path: Path) -> None:
+    path, truth = written(tmp_path / "a.wav", Written(data_size=none, before=("LIST",)))
+    (tmp_path / "b.wav").write_bytes(samples_only(path.read_bytes(), path))
+    samples, told = read(tmp_path / "b.wav")
+    assert np.array_equal(samples, truth)
+    assert not told
