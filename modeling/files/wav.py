@@ -12,7 +12,7 @@ import numpy as np
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import InputError
 from tactileq.modeling.files.reading import check_file, read_bytes
-from tactileq.modeling.files.wav_chunks import FORMS, held_samples
+from tactileq.modeling.files.wav_chunks import WAV_FORMS, held_samples
 
 Tell = Callable[[str], object]
 
@@ -98,7 +98,7 @@ def _sound(path: Path, tell: Tell) -> Path | BytesIO:
         raise InputError(f"expected a WAV file, got {path}, which is empty; record it again.")
     if form in _OTHER_FORMS:
         return path
-    if form not in FORMS:
+    if form not in WAV_FORMS:
         raise InputError(f"expected a WAV file, got {path}, which holds no sound; convert it.")
     held = held_samples(read_bytes(path, "a WAV file"), path)
     if held.doubt:
@@ -135,5 +135,5 @@ def mended_wav(path: Path) -> bytes | None:
         As `held_samples`.
     """
     data = read_bytes(path, "a WAV file")
-    held = held_samples(data, path) if data[:4] in FORMS else None
+    held = held_samples(data, path) if data[:4] in WAV_FORMS else None
     return held.file() if held is not None and held.doubt else None

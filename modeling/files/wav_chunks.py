@@ -12,7 +12,7 @@ from typing import Literal
 from tactileq.modeling.errors import InputError
 
 Order = Literal["little", "big"]
-FORMS = {b"RIFF": b"RIFF", b"RIFX": b"RIFX", b"RF64": b"RIFF", b"BW64": b"RIFF"}
+WAV_FORMS = {b"RIFF": b"RIFF", b"RIFX": b"RIFX", b"RF64": b"RIFF", b"BW64": b"RIFF"}
 # Chunks that stand beside samples; with any other name they must fit without a gap.
 _BESIDE = re.compile(
     rb"LIST|JUNK|junk|FLLR|PAD |fact|PEAK|bext|iXML|axml|chna|cart|id3 |ID3 |cue |smpl|inst|acid"
@@ -77,7 +77,7 @@ def held_samples(data: bytes, path: Path) -> HeldSamples:
     samples = data[header.start : header.start + found]
     # The number of samples in a wrong header's `fact` is as wrong.
     return HeldSamples(
-        FORMS[data[:4]], header.fmt, b"" if doubt else header.fact, samples, doubt=doubt
+        WAV_FORMS[data[:4]], header.fmt, b"" if doubt else header.fact, samples, doubt=doubt
     )
 
 
@@ -91,7 +91,7 @@ class _Header:
     def __init__(self, data: bytes, path: Path) -> None:
         self.data, self.path, self.order = data, path, _order(data[:4])
         found: dict[bytes, tuple[int, int]] = {}
-        if data[:4] in FORMS and data[8:12] == b"WAVE":
+        if data[:4] in WAV_FORMS and data[8:12] == b"WAVE":
             for name, start, size in _chunks(data, 12, self.order):
                 found.setdefault(name, (start, size))
                 if name == b"data":
