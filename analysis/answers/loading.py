@@ -38,6 +38,7 @@ from tactileq.modeling.files.answer_tables import (
 )
 from tactileq.modeling.files.columns import shortened_hash
 from tactileq.modeling.files.hashes import sha256_of_values
+from tactileq.modeling.files.places import matching
 
 _SIMULATED = ("Simulated", "SimulatedParticipant", "SimulatedRig")
 
@@ -220,7 +221,7 @@ def _load_task(
     """All sessions of one task beneath each other, or None where there is none."""
     sessions, warnings = [], gathered.warnings
     unordered: list[str] = []
-    for path in sorted(folder.glob(f"sub-*/ses-*/beh/*_task-{task}_beh.tsv")):
+    for path in matching(folder, f"sub-*/ses-*/beh/*_task-{task}_beh.tsv"):
         participant, session = path.parts[-4], path.parts[-3]
         left_out, told_before = participant in gathered.leaving_out, len(warnings)
         table = None
@@ -303,7 +304,7 @@ def _planned_of(
 def _unanswered(folder: Path, task: str, *, gathered: Gathered) -> list[str]:
     """A sentence for each session that was begun but whose answers are not there."""
     sentences = []
-    for manifest in sorted(folder.glob(f"sourcedata/sub-*/ses-*/*_task-{task}_manifest.json")):
+    for manifest in matching(folder, f"sourcedata/sub-*/ses-*/*_task-{task}_manifest.json"):
         stem = manifest.name.removesuffix("manifest.json")
         participant, session = manifest.parts[-3:-1]
         if (folder / participant / session / "beh" / f"{stem}beh.tsv").is_file():

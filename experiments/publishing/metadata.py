@@ -21,6 +21,7 @@ from tactileq.experiments.publishing.archive import (
     SETS_OF_MODELS,
     STIMULI,
 )
+from tactileq.modeling.files.places import matching
 from tactileq.modeling.files.tables import guarded
 
 if TYPE_CHECKING:
@@ -123,7 +124,7 @@ def _write_json(path: Path, values: Mapping[str, Any]) -> None:
 
 
 def _answer_tables(archive: Path) -> list[Path]:
-    return sorted((archive / DATA).glob("sub-*/ses-*/beh/*_beh.tsv"))
+    return matching(archive / DATA, "sub-*/ses-*/beh/*_beh.tsv")
 
 
 def _write_psych_ds(archive: Path, publication: Publication) -> list[Path]:

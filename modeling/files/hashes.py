@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from tactileq.modeling.files.places import is_hidden
+from tactileq.modeling.files.places import matching
 
 
 def sha256_of(text: str) -> str:
@@ -32,7 +32,7 @@ def sha256_of_paths(paths: Iterable[Path]) -> dict[str, str]:
 
     What is no file or folder, or a file that cannot be read, is left out: who reads it says so.
     That of a file is its bytes'. That of a folder is the one of a list with a line for each file
-    below it but locks and what is not finished, in order: its path in the folder, a null character
+    below it that may be data (`places.is_data`), in order: its path in the folder, a null character
     (which no path can hold) and the SHA-256 of its bytes. So what moves from a name to the bytes,
     or to another file, changes it.
     """
@@ -47,12 +47,8 @@ def sha256_of_paths(paths: Iterable[Path]) -> dict[str, str]:
 
 
 def _sha256_of_folder(path: Path) -> str:
-    files = {file.relative_to(path): file for file in path.rglob("*") if file.is_file()}
-    names = {
-        place.as_posix(): file
-        for place, file in files.items()
-        if not any(map(is_hidden, place.parts))
-    }
+    files = (file for file in matching(path, "**/*") if file.is_file())
+    names = {file.relative_to(path).as_posix(): file for file in files}
     lines = []
     for name in sorted(names):
         sha256 = "not readable"

@@ -23,6 +23,8 @@ from tactileq.modeling.files.syncing import make_folder
 ENDING = ".unfinished"
 LOCK_NAME = ".tactileq.lock"  # of a folder; that of a file beside it has this ending
 _UNFINISHED = re.compile(r"\..*\.[a-z0-9_]{8}" + re.escape(ENDING))
+# macOS' twins of files on disks of other systems, its view of a folder, and Windows'.
+_OF_SYSTEMS = re.compile(r"\._.+|\.DS_Store|Thumbs\.db|desktop\.ini")
 _NAME_LENGTH = 40  # characters of a place's name in a hidden one, which must not become too long
 
 
@@ -50,9 +52,28 @@ def behind_links(path: str | Path) -> Path:
 
 
 def is_hidden(name: str) -> bool:
-    """Whether a file or folder of this name is a lock, or what a process has not finished."""
+    """Whether a file or folder of this name is nobody's work, and goes with the folder it is in.
+
+    That is a lock, what a process has not finished, and what systems put beside files.
+    """
     is_lock = name.startswith(".") and name.endswith(LOCK_NAME)
-    return is_lock or _UNFINISHED.fullmatch(name) is not None
+    return is_lock or any(kind.fullmatch(name) for kind in (_OF_SYSTEMS, _UNFINISHED))
+
+
+def is_data(path: Path) -> bool:
+    """Whether a file may hold data or a model: hidden ones do not, nor those in hidden folders.
+
+    Parameters
+    ----------
+    path : Path
+        From the folder of the data on; what that is in may be hidden.
+    """
+    return not any(name.startswith(".") or is_hidden(name) for name in path.parts)
+
+
+def matching(folder: Path, pattern: str) -> list[Path]:
+    """The files and folders of a folder that match a pattern and may be data, in order."""
+    return sorted(path for path in folder.glob(pattern) if is_data(path.relative_to(folder)))
 
 
 @contextmanager

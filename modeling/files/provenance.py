@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tactileq.modeling.files.hashes import sha256_of_file
+from tactileq.modeling.files.places import matching
 from tactileq.modeling.files.writing import write_text
 
 PROVENANCE_NAME = "provenance.json"
@@ -70,8 +71,8 @@ def seal_folder(folder: Path, provenance: Mapping[str, Any]) -> None:
 
 
 def sha256_of_files(folder: Path) -> dict[str, str]:
-    """SHA-256 of each file in a folder by its path there, in the order of these."""
-    paths = [path for path in folder.rglob("*") if not path.is_dir()]
+    """SHA-256 of each file in a folder that may be data by its path there, in their order."""
+    paths = [path for path in matching(folder, "**/*") if not path.is_dir()]
     hashes = {path.relative_to(folder).as_posix(): sha256_of_file(path) for path in paths}
     return dict(sorted(hashes.items()))
 

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import InputError
-from tactileq.modeling.files.reading import check_file
+from tactileq.modeling.files.reading import check_file, read_bytes
+from tactileq.modeling.files.wav_chunks import WAV_FORMS, held_samples
 
-# What a WAV file needs to be one; `fact`, the number of samples, beside floats.
-_NEEDED = {b"fmt ": 40, b"fact": 4, b"data": None}
-# The first bytes of sound files. In others libsndfile would look for MP3 and report it on stderr.
-_FORMS = (b"RIFF", b"RIFX", b"RF64", b"riff", b"FORM", b"fLaC")
+Tell = Callable[[str], object]
+
+# First bytes of other sound files. In others libsndfile looks for MP3 and reports it on stderr.
+_OTHER_FORMS = (b"riff", b"FORM", b"fLaC")
+_LONGEST_FMT = 40  # of samples that are not encoded in blocks
 
 
 def full_scale(value_g: float, file: str) -> float:
@@ -23,13 +28,17 @@ def full_scale(value_g: float, file: str) -> float:
     return value_g
 
 
-def read_wav(path: Path, *, channel: int | None = None) -> tuple[Floats, float]:
+def read_wav(
+    path: Path, *, channel: int | None = None, tell: Tell = warnings.warn
+) -> tuple[Floats, float]:
     """Samples (n,), 1 = full scale, and rate (Hz) of one channel of a WAV file.
 
     Parameters
     ----------
     channel : int, optional
         Which one, from 1; may be left out where there is only one.
+    tell : callable
+        As of `read_wav_channels`.
 
     Raises
     ------
@@ -37,7 +46,7 @@ def read_wav(path: Path, *, channel: int | None = None) -> tuple[Floats, float]:
         If the file is no readable WAV, is shorter than it says, has no such channel, or has several
         and none is chosen.
     """
-    samples, rate_hz = read_wav_channels(path)
+    samples, rate_hz = read_wav_channels(path, tell=tell)
     count = samples.shape[1]
     if channel is None and count != 1:
         raise InputError(
@@ -52,8 +61,13 @@ def read_wav(path: Path, *, channel: int | None = None) -> tuple[Floats, float]:
     return np.ascontiguousarray(samples[:, chosen - 1]), rate_hz
 
 
-def read_wav_channels(path: Path) -> tuple[Floats, float]:
+def read_wav_channels(path: Path, *, tell: Tell = warnings.warn) -> tuple[Floats, float]:
     """Samples (n, channels), 1 = full scale, and rate (Hz) of a WAV file.
+
+    Parameters
+    ----------
+    tell : callable
+        Takes the sentence on a header that does not say how many samples the file holds.
 
     Raises
     ------
@@ -62,15 +76,8 @@ def read_wav_channels(path: Path) -> tuple[Floats, float]:
     """
     import soundfile  # late: loads a shared library that most uses never need
 
-    check_file(path, "a WAV file")
-    with path.open("rb") as file:
-        form, announced = file.read(4), int.from_bytes(file.read(4), "little") + 8
-    if not form:
-        raise InputError(f"expected a WAV file, got {path}, which is empty; record it again.")
-    if form not in _FORMS:
-        raise InputError(f"expected a WAV file, got {path}, which holds no sound; convert it.")
     try:
-        samples, rate_hz = soundfile.read(path, dtype="float64", always_2d=True)
+        samples, rate_hz = soundfile.read(_sound(path, tell), dtype="float64", always_2d=True)
     except soundfile.LibsndfileError as error:
         raise InputError(
             f"expected a WAV file, got {path} ({error.error_string.rstrip('.')}); convert it."
@@ -79,13 +86,24 @@ def read_wav_channels(path: Path) -> tuple[Floats, float]:
         raise InputError(
             f"expected a WAV file that fits into memory, got {path}; cut it into parts."
         ) from None
-    # Streaming recorders write 0 or about the largest size there is; a last pad byte may lack.
-    if form == b"RIFF" and path.stat().st_size + 1 < announced and 8 < announced < 0x7FFF0000:
-        raise InputError(
-            f"expected {announced} bytes in {path}, as its header says, got "
-            f"{path.stat().st_size}; the file is truncated, copy or record it again."
-        )
     return samples, float(rate_hz)
+
+
+def _sound(path: Path, tell: Tell) -> Path | BytesIO:
+    """What libsndfile reads: WAV files with right sizes, and other sound files as they are."""
+    check_file(path, "a WAV file")
+    with path.open("rb") as file:
+        form = file.read(4)
+    if not form:
+        raise InputError(f"expected a WAV file, got {path}, which is empty; record it again.")
+    if form in _OTHER_FORMS:
+        return path
+    if form not in WAV_FORMS:
+        raise InputError(f"expected a WAV file, got {path}, which holds no sound; convert it.")
+    held = held_samples(read_bytes(path, "a WAV file"), path)
+    if held.doubt:
+        tell(held.doubt)
+    return BytesIO(held.file())
 
 
 def samples_only(data: bytes, path: Path) -> bytes:
@@ -103,20 +121,19 @@ def samples_only(data: bytes, path: Path) -> bytes:
     Raises
     ------
     InputError
-        If it is no RIFF/WAVE file with a format and samples.
+        As `held_samples`.
     """
-    kept, at = {}, 12
-    if data[:4] == b"RIFF" and data[8:12] == b"WAVE":
-        while at + 8 <= len(data) and b"data" not in kept:
-            name, size = data[at : at + 4], int.from_bytes(data[at + 4 : at + 8], "little")
-            if name in _NEEDED:
-                kept[name] = data[at + 8 : at + 8 + size][: _NEEDED[name]]
-            at += 8 + size + size % 2
-    if not (kept.get(b"fmt ") and kept.get(b"data")):
-        raise InputError(
-            f"expected a WAV file (RIFF) with a format and samples at {path}, got something else; "
-            "convert it."
-        )
-    chunks = (n + len(c).to_bytes(4, "little") + c + bytes(len(c) % 2) for n, c in kept.items())
-    body = b"WAVE" + b"".join(chunks)
-    return b"RIFF" + len(body).to_bytes(4, "little") + body
+    return held_samples(data, path).file(longest_fmt=_LONGEST_FMT)
+
+
+def mended_wav(path: Path) -> bytes | None:
+    """Format and samples of a WAV file whose sizes are wrong, with right ones; None of any other.
+
+    Raises
+    ------
+    InputError
+        As `held_samples`.
+    """
+    data = read_bytes(path, "a WAV file")
+    held = held_samples(data, path) if data[:4] in WAV_FORMS else None
+    return held.file() if held is not None and held.doubt else None

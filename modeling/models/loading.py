@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from tactileq.modeling.errors import InputError, shown
 from tactileq.modeling.files.documents import read_json_object
+from tactileq.modeling.files.places import matching
 from tactileq.modeling.models.ar_model import ARModel
 from tactileq.modeling.models.regressed_model import RegressedModel
 from tactileq.modeling.models.texture_model import TextureModel
@@ -58,7 +59,7 @@ def models_in(folder: Path) -> tuple[list[Path], list[Path]]:
     InputError
         If none may be a model.
     """
-    models, others = models_among(sorted(folder.glob("*.json")))
+    models, others = models_among(matching(folder, "*.json"))
     if not models:
         raise InputError(f"expected model files in {folder}, got none; fit or simplify some first.")
     return models, others

@@ -11,6 +11,7 @@ from tactileq.modeling.errors import InputError
 from tactileq.modeling.files.described import FileSection, key
 from tactileq.modeling.files.described_json import DescribedJson
 from tactileq.modeling.files.hashes import sha256_of_values
+from tactileq.modeling.files.places import matching
 from tactileq.modeling.models.texture_model import TextureModel
 from tactileq.modeling.perception.thresholds import Threshold
 from tactileq.modeling.reprs import one_line
@@ -148,7 +149,7 @@ def load_simplifications(folder: Path) -> dict[str, Simplification]:
         For a folder without any, a file that is none, and two of one texture.
     """
     found: dict[str, Simplification] = {}
-    for path in sorted(folder.glob(f"*{ENDING}")):
+    for path in matching(folder, f"*{ENDING}"):
         loaded = Simplification.load(path)
         if loaded.model.texture in found:
             raise InputError(

@@ -16,6 +16,7 @@ from tactileq.modeling.files.places import behind_links, is_hidden, locked, unfi
 from tactileq.modeling.files.reading import reason_of
 from tactileq.modeling.files.syncing import sync_file, sync_folder
 from tactileq.modeling.files.tables import read_cells, table_text
+from tactileq.modeling.files.wav import mended_wav
 from tactileq.modeling.files.writing import write_files, write_text
 from tactileq.modeling.recordings.recording import Recording
 from tactileq.modeling.recordings.recording_set import (
@@ -229,7 +230,10 @@ def _write(path: Path, recording: Recording, source: WavSource | None) -> dict[s
         write_samples(path, recording)
         sync_file(path)
         return row
-    shutil.copyfile(source.path, path)
+    if (mended := mended_wav(source.path)) is None:
+        shutil.copyfile(source.path, path)
+    else:
+        path.write_bytes(mended)
     sync_file(path)
     return row | {"g_per_fullscale": source.g_per_fullscale, "channel": source.channel}
 

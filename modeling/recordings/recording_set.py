@@ -21,6 +21,7 @@ from tactileq.modeling.errors import InputError, counted, shortened, shown
 from tactileq.modeling.files.columns import ABOVE_0, Column, chosen, number_in
 from tactileq.modeling.files.documents import read_json_object
 from tactileq.modeling.files.folders import check_replaceable, listed_file, replace_folder
+from tactileq.modeling.files.places import matching
 from tactileq.modeling.files.reading import read_text
 from tactileq.modeling.files.tables import read_cells, typed, write_table
 from tactileq.modeling.files.wav import read_wav
@@ -258,7 +259,7 @@ def recording_folders(folder: Path) -> list[Path]:
     """The folder itself where it is a recording set, else its sub-folders that are, by name."""
     if is_recording_set(folder) or not folder.is_dir():
         return [folder]
-    below = sorted(path for path in folder.iterdir() if path.is_dir() and is_recording_set(path))
+    below = [path for path in matching(folder, "*") if path.is_dir() and is_recording_set(path)]
     return below or [folder]
 
 
@@ -296,7 +297,7 @@ def _check_files(rows: Sequence[Mapping[str, str]], index: Path) -> None:
 
 
 def _sidecar_files(folder: Path) -> list[Path]:
-    return sorted(p for p in folder.glob("*.wav") if p.with_suffix(".json").is_file())
+    return [p for p in matching(folder, "*.wav") if p.with_suffix(".json").is_file()]
 
 
 def index_row(recording: Recording) -> dict[str, object]:

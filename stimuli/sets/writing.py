@@ -16,6 +16,7 @@ import numpy as np
 from tactileq.modeling import InputError, Threshold, compensation_for
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.files.folders import Contents, check_replaceable, replace_folder
+from tactileq.modeling.files.places import matching
 from tactileq.modeling.files.reading import reason_of
 from tactileq.modeling.files.stimulus_table import MANIFEST
 from tactileq.modeling.files.writing import file_stem
@@ -172,7 +173,7 @@ def check_place(target: Path) -> Contents:
     if not (target / FOLDER).is_dir():
         return seen
     named = Recipe.load(target / RECIPE).files()
-    foreign = sorted(set((target / FOLDER).iterdir()) - set(named))
+    foreign = sorted(set(matching(target / FOLDER, "*")) - set(named))
     if foreign:
         raise InputError(
             f"expected a new folder or a stimulus set, got {target} with a file in it that its "

@@ -17,7 +17,9 @@ from rocrate.rocrate import ROCrate
 from tactileq.experiments.console.languages import Texts, texts_of_study
 from tactileq.experiments.sessions.kept.stored_sessions import held_sessions
 from tactileq.experiments.study.study import Study
+from tactileq.modeling import RecordingSet
 from tactileq.modeling.files.hashes import seal_over
+from tactileq.stimuli.planted.textures import RECORDER_RATE_HZ, planted_texture, record_texture
 from tests.experiments.verification.small_studies import (
     run_all,
     simplified_texture,
@@ -199,3 +201,59 @@ def test_validate_counts_errors(main, here: Path) -> None:
     bad = main("study", "validate", "data")
     assert bad.returncode == 1
     assert "dataset_description.json" in bad.stderr
+
+
+# --- What systems put beside files ----------------------------------------------------------------
+
+TWIN = b"\0\5\x16\7\0\2\0\0Mac OS X        \xb0\xff"
+COMMANDS = (
+    ("verify", "data"),
+    ("study", "status", "--study", "study.toml", "--data", "data"),
+    ("study", "check", "checked.toml"),
+    ("stimuli", "full", "--speed", "150", "--force", "1", "--out", "set"),
+    ("simplify", "full/canvas.json", "--threshold", "codec", "--out", "again"),
+    ("model", "recordings", "--layers", "1", "--out", "fitted"),
+    ("analyze", "data", "--seed", "3", "--out", "results"),
+    ("verify", "data", "results"),
+    ("publish", "data", "--study", "study.toml", "--results", "results", "--out", "arch"),
+    ("verify", "arch"),
+)
+
+
+def contents(folder: Path) -> set[str]:
+    return {path.relative_to(folder).as_posix() for path in folder.rglob("*")}
+
+
+def put_beside_files(here: Path) -> None:
+    for folder in {path.parent for path in here.rglob("*")}:
+        for path in [path for path in folder.glob("[!.]*") if path.is_file()]:
+            path.with_name(f"._{path.name}").write_bytes(TWIN)
+        for name in (".DS_Store", "Thumbs.db", "desktop.ini"):
+            (folder / name).write_bytes(b"\0\0\0\1Bud1")
+
+
+def test_twins_of_files_and_views_of_folders_change_nothing(main, here: Path) -> None:
+    """macOS puts them on disks of other systems and network shares."""
+    for texture in TEXTURES:
+        truth = planted_texture(texture, rate_hz=RECORDER_RATE_HZ)
+        few = record_texture(truth, duration_s=0.5).recordings[:4]
+        RecordingSet(few).save(here / "recordings" / texture)
+
+    places = {"models": {"full": "full", "simplified": "simplified"}}
+    checked = {**small_study(TEXTURES).to_dict(), **places}
+    (here / "checked.toml").write_text(tomlkit.dumps(checked))
+
+    def told() -> list[tuple[int, str, str]]:
+        done = [main(*words) for words in COMMANDS]
+        return [(one.returncode, one.stdout, one.stderr) for one in done]
+
+    plain = told()
+    assert [one for one in plain if one[0]] == []
+    archived = contents(here / "arch")
+    for name in ("arch", "results", "set", "again", "fitted"):
+        shutil.rmtree(here / name)
+    put_beside_files(here)
+    assert told() == plain
+    assert contents(here / "arch") == archived
+    put_beside_files(here)
+    assert told() == plain

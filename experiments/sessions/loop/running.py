@@ -32,6 +32,7 @@ from tactileq.experiments.study.models import ModelSets
 from tactileq.experiments.study.study import Study, plan_sha256
 from tactileq.experiments.study.trays import require_trays
 from tactileq.modeling import InputError
+from tactileq.modeling.files.places import matching
 from tactileq.rig.shared.interface import TextureRig
 
 
@@ -349,7 +350,7 @@ def _intake(study: Study, root: Path, person: RosterEntry) -> Intake:
 
 def _was_welcomed(root: Path, subject: int, consent: str) -> bool:
     """Whether somebody was welcomed in an earlier session, having given this consent."""
-    logs = (root / "sourcedata" / f"sub-{subject:02d}").glob("ses-*/*_log.jsonl")
+    logs = matching(root / "sourcedata" / f"sub-{subject:02d}", "ses-*/*_log.jsonl")
     return any(_welcomes(log, consent) for log in logs)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from tactileq.modeling.errors import InputError, shown
 from tactileq.modeling.files.columns import chosen
+from tactileq.modeling.files.places import matching
 from tactileq.modeling.files.reading import read_bytes
 from tactileq.modeling.files.stimulus_table import MANIFEST, STIMULUS_COLUMNS
 from tactileq.modeling.files.tables import read_cells, typed
@@ -167,7 +168,7 @@ def _stimulus(
 
 def _sources(folder: Path) -> dict[str, Path]:
     """The copies of models that a set keeps, by the SHA-256 of their file."""
-    copies = (folder / "sources").glob("*.json")
+    copies = matching(folder / "sources", "*.json")
     return {hashlib.sha256(read_bytes(path, "a model")).hexdigest(): path for path in copies}
 
 

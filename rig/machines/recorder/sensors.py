@@ -14,6 +14,7 @@ import numpy as np
 
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import InputError
+from tactileq.modeling.files.places import matching
 from tactileq.modeling.models.grid import Condition
 from tactileq.rig.machines.recorder.evaluation import Axis, read_evaluation
 from tactileq.rig.recording.capture.input import AudioInput, InputBlock
@@ -209,7 +210,7 @@ class EvaluationFiles:
     def _seen(self) -> list[_Seen]:
         """Its CSV files; one that is overwritten is another one."""
         found = []
-        for path in sorted(self._folder.glob("*")):
+        for path in matching(self._folder, "*"):
             if path.suffix.lower() == ".csv":
                 with suppress(OSError):  # renamed or removed just now
                     state = path.stat()

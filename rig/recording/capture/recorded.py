@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from tactileq.modeling.errors import InputError
-from tactileq.modeling.files.places import locked
+from tactileq.modeling.files.places import locked, matching
 from tactileq.modeling.files.tables import write_table
 from tactileq.modeling.models.grid import Condition
 from tactileq.modeling.recordings.recording_set import (
@@ -21,9 +21,8 @@ def check_continues(folder: Path, *ours: str) -> None:
     """Refuse a folder that is neither new or empty, nor holds a recording set or one of `ours`."""
     if not folder.exists():
         return
-    if not folder.is_dir() or (
-        not {INDEX_NAME, *ours} & {path.name for path in folder.iterdir()} and any(folder.iterdir())
-    ):
+    there = {path.name for path in matching(folder, "*")}
+    if not folder.is_dir() or (there and not {INDEX_NAME, *ours} & there):
         raise InputError(
             f"expected a new folder, or one of recordings to go on with, got {folder}, which is "
             "something else; choose another name."

@@ -85,7 +85,8 @@ def import_wav_file(
 ) -> Imported:
     """One WAV file, with warnings and doubts; otherwise as `import_wav`."""
     channel = channel if label.channel is None else label.channel
-    samples, rate_hz = read_wav(path, channel=channel)
+    told: list[str] = []
+    samples, rate_hz = read_wav(path, channel=channel, tell=told.append)
     scale = g_per_fullscale if label.g_per_fullscale is None else label.g_per_fullscale
     if scale is not None:
         full_scale(scale, path.name)
@@ -96,7 +97,7 @@ def import_wav_file(
         label,
         unit="arbitrary" if scale is None else "g",
     )
-    warnings = [*_beyond_full_scale(path, samples, scale), *_too_short(path, recording)]
+    warnings = [*told, *_beyond_full_scale(path, samples, scale), *_too_short(path, recording)]
     doubts = doubts_about(recording, path.name, g_per_fullscale=scale)
     return Imported(recording, tuple(warnings), WavSource(path, channel or 1, scale), doubts)
 

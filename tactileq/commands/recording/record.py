@@ -113,13 +113,13 @@ def record_in_silico(
     folder: Path, texture: str, *, rate_hz: float | None, duration_s: float, seed: int
 ) -> None:
     """Record a planted texture, 7 speeds x 7 forces."""
-    from tactileq.modeling.files.folders import folder_behind, replace_folder
+    from tactileq.modeling.files.folders import contents_of, folder_behind, replace_folder
     from tactileq.modeling.files.provenance import write_provenance
     from tactileq.stimuli.planted.textures import RECORDER_RATE_HZ, planted_texture, record_texture
 
     rate_hz = RECORDER_RATE_HZ if rate_hz is None else rate_hz
     folder_behind(folder)
-    if folder.exists() and (folder.is_file() or any(folder.iterdir())):
+    if contents_of(folder):
         raise ValueError(f"expected a new folder, got {folder}, which exists; choose another name.")
     truth = planted_texture(texture, rate_hz=rate_hz)
     with progress(f"Recording {texture} in silico", 1) as advance:

@@ -19,6 +19,7 @@ def write_models(place: Path, target: Path, *, textures: Collection[str]) -> Ite
         For a file of models that is none.
     """
     from tactileq.modeling import Simplification
+    from tactileq.modeling.files.places import matching
     from tactileq.modeling.models.loading import load_model, models_in
     from tactileq.modeling.perception.verdicts import ENDING
 
@@ -26,7 +27,7 @@ def write_models(place: Path, target: Path, *, textures: Collection[str]) -> Ite
         if (model := load_model(path)).texture in textures:
             model.save(target / path.name)
             yield target / path.name
-    for path in sorted(place.glob(f"*{ENDING}")):
+    for path in matching(place, f"*{ENDING}"):
         if (verdicts := Simplification.load(path)).model.texture in textures:
             verdicts.save(target / path.name)
             yield target / path.name
@@ -40,6 +41,7 @@ def write_recordings(place: Path, target: Path, *, textures: Collection[str]) ->
     InputError
         For a texture of which none can be used.
     """
+    from tactileq.modeling.files.places import matching
     from tactileq.modeling.files.writing import file_stem
     from tactileq.printing import usable_recordings
 
@@ -47,7 +49,7 @@ def write_recordings(place: Path, target: Path, *, textures: Collection[str]) ->
         own, folder = place / file_stem(texture), target / file_stem(texture)
         if own.is_dir():  # else nobody answered about it, or the analysis says that it is missing
             usable_recordings(own, texture).save(folder)
-            yield from folder.iterdir()
+            yield from matching(folder, "*")
 
 
 def write_stimuli(place: Path, target: Path) -> Iterator[Path]:

@@ -101,11 +101,12 @@ def differing_models(name: str, place: Path, manifests: Sequence[SessionManifest
         If a file of models is none.
     """
     from tactileq.experiments.study.models import model_sha256
+    from tactileq.modeling.files.places import matching
     from tactileq.modeling.models.loading import load_any_models
     from tactileq.modeling.perception.verdicts import ENDING, load_simplifications
 
     found = load_any_models(place)
-    simplified = load_simplifications(place) if any(place.glob(f"*{ENDING}")) else {}
+    simplified = load_simplifications(place) if matching(place, f"*{ENDING}") else {}
     every = [item for one in manifests for item in one.models_sha256.items()]
     any_set = {(texture, sha256) for texture, hashes in every for sha256 in hashes.values()}
     for texture, sha256 in sorted({(texture, hashes[name]) for texture, hashes in every}):

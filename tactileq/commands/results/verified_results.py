@@ -153,9 +153,10 @@ def _changed(folder: Path, stated: Mapping[str, str]) -> Iterator[str]:
 
 def _files_in(folder: Path) -> dict[str, Path]:
     """A folder's files but its provenance, by their paths in it."""
+    from tactileq.modeling.files.places import matching
     from tactileq.modeling.files.provenance import PROVENANCE_NAME
 
-    paths = (path for path in folder.rglob("*") if path.is_file())
+    paths = (path for path in matching(folder, "**/*") if path.is_file())
     files = {path.relative_to(folder).as_posix(): path for path in paths}
     return {name: path for name, path in files.items() if name != PROVENANCE_NAME}
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
 import pytest
 import soundfile
 
-from tactileq.modeling import InputError, RecordingSet
+from tactileq.modeling import InputError, Recording, RecordingSet
 from tactileq.modeling.files.wav import read_wav, samples_only
+from tactileq.modeling.recordings.recording_set import recording_folders
 from tests.refusals import refused
 
 NOISE = np.random.default_rng(1).standard_normal(100)
@@ -160,3 +162,26 @@ def test_samples_only_leaves_nothing_but_the_sound(tmp_path: Path, subtype: str)
 def test_samples_only_of_what_is_no_sound(data: bytes) -> None:
     with refused(InputError, expected="WAV", got="else", names="a.wav"):
         samples_only(data, Path("a.wav"))
+
+
+def test_twins_of_wav_files_are_no_recordings(tmp_path: Path) -> None:
+    """Nor are the folders that hold them alone."""
+    for folder in (tmp_path / "felt", tmp_path / ".Trashes"):
+        folder.mkdir()
+        write_wav(folder / "a.wav", NOISE / 10)
+        (folder / "a.json").write_text(json.dumps(SIDECAR))
+        for name in ("._a.wav", "._a.json"):
+            (folder / name).write_bytes(b"\0\5\x16\7")
+    assert len(RecordingSet.load(tmp_path / "felt")) == 1
+    assert recording_folders(tmp_path) == [tmp_path / "felt"]
+
+
+@pytest.mark.parametrize(("name", "goes"), [("._0001.csv", True), (".notes", False)])
+def test_what_systems_put_into_a_set_goes_with_it(tmp_path: Path, name: str, goes: bool) -> None:
+    """A hidden file of somebody does not."""
+    made = RecordingSet([Recording(NOISE, 8000.0, 80.0, 1.5, "felt")])
+    made.save(tmp_path / "set")
+    (tmp_path / "set" / name).write_bytes(b"\0\5\x16\7")
+    with nullcontext() if goes else refused(InputError, got=name):
+        made.save(tmp_path / "set")
+    assert (tmp_path / "set" / name).exists() != goes

@@ -22,7 +22,7 @@ from tactileq.rig.recording.importing.files import (
     usable,
 )
 from tactileq.rig.recording.importing.labels import Label, labels_from_table
-from tests.refusals import check_refusal, refused
+from tests.refusals import check_refusal, refused, warned
 
 LABEL = Label("oak", 100.0, 1.0)
 CHANNEL_C = {"mv_per_g": 1.0, "named": {"z": "Channel C"}}
@@ -32,6 +32,17 @@ RATE_HZ = 3200.0
 @pytest.fixture
 def axes() -> NDArray[np.float64]:
     return np.random.default_rng(5).normal(0, 0.3, (3, 2000))
+
+
+def test_a_header_that_was_never_closed_is_told_of(tmp_path: Path) -> None:
+    wavfile.write(tmp_path / "a.wav", 8000, np.arange(4000, dtype=np.int16))
+    whole = (tmp_path / "a.wav").read_bytes()
+    (tmp_path / "a.wav").write_bytes(whole[:40] + bytes(4) + whole[44:])
+    imported = import_wav_file(tmp_path / "a.wav", LABEL, g_per_fullscale=16)
+    assert imported.recording.samples.size == 4000
+    check_refusal(imported.warnings[0], names=["a.wav", "header", "0 samples", "4000 samples"])
+    with warned(names=["a.wav", "4000 samples"]):
+        import_wav([tmp_path / "a.wav"], [LABEL], g_per_fullscale=16)
 
 
 def write_csv(
