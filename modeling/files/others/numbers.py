@@ -34,14 +34,14 @@ class Style(NamedTuple):
 
     @property
     def pattern(self) -> re.Pattern[str]:
-        """What matches such a number, up to its exponent."""
-        whole = r"[0-9]+"
-        if self.thousands:
-            whole = rf"(?:[1-9][0-9]{{0,2}}(?:{re.escape(self.thousands)}[0-9]{{3}})+|[0-9]+)"
+        """What matches such a number; one with an exponent has no thousands."""
         point = re.escape(self.decimal)
-        return re.compile(
-            rf"[+\-\u2212]?(?:{whole}(?:{point}[0-9]*)?|{point}[0-9]+)(?:[eE][+\-]?[0-9]+)?"
-        )
+        fraction = rf"(?:{point}[0-9]*)?"
+        number = rf"(?:[0-9]+{fraction}|{point}[0-9]+)(?:[eE][+\-]?[0-9]+)?"
+        if self.thousands:
+            groups = rf"[1-9][0-9]{{0,2}}(?:{re.escape(self.thousands)}[0-9]{{3}})+{fraction}"
+            number = f"(?:{groups}|{number})"
+        return re.compile(rf"[+\-\u2212]?{number}")
 
     def plain(self, cell: str) -> str:
         """A number of this style, as Python writes it."""

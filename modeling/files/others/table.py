@@ -137,7 +137,13 @@ class OtherTable:
         InputError
             If two ways fit and give other numbers.
         """
-        seen = Numbers({name: self.cells(name) for name in columns}, decimal=self.decimal)
+        own = [self.names[self.place(name)] for name in columns]
+        shown_as = [
+            name if own.count(name) == 1 else given
+            for name, given in zip(own, columns, strict=True)
+        ]
+        cells = dict(zip(shown_as, map(self.cells, columns), strict=True))
+        seen = Numbers(cells, decimal=self.decimal)
         return seen.style(self.path)
 
     def floats(self, name: str, style: Style, *, what: str = "a number") -> Floats:
@@ -152,7 +158,7 @@ class OtherTable:
         values, wrong = converted(cells, style)
         if wrong >= 0:
             raise InputError(
-                f"expected {what} in column {shown(name)} of {self.where(self.lines[wrong])}, got "
+                f"expected {what} in column {shown(self.names[self.place(name)])} of {self.where(self.lines[wrong])}, got "
                 f"{shown(cells[wrong])}; correct that cell."
             )
         return values

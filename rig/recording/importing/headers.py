@@ -31,6 +31,7 @@ SPELLINGS: Mapping[str, Sequence[str]] = {
 _UNITS = {spelling: unit for unit, spellings in SPELLINGS.items() for spelling in spellings}
 _TIME_UNITS = ("s", "ms", "us", "ns")
 TIME_NAMES = {"time", "t", "timestamp"}
+_TIME_ENDS = ("_time", "_timestamp", "_seconds")  # s1_timestamp (ms)
 _BRACKETS = re.compile(r"[\[(]([^\[\]()]*(?:\([^()]*\))?[^\[\]()]*)[\])]")
 _BETWEEN = re.compile(r"\s+in\s+|\s*[/,]\s*|[\s_]+")  # a name and its unit: z in g, t/s, x_g
 _ACC = r"acc(?:el(?:eration|erometer)?)?"
@@ -81,20 +82,20 @@ def _joined(name: str) -> str:
 
 
 def _time_or(name: str, unit: str) -> tuple[str, str]:
-    """The same, or "time" where only a unit of time, written out, or that it elapses is named."""
+    """The same; where only a unit is named, written out, that one: Second is the time, Volt in V."""
     *others, last = [word for word in name.split("_") if word != "elapsed"] or ["time"]
     if others:
         return name, unit
     written_out = known_unit(last) if len(last) > 2 else None
     if not unit and written_out in _TIME_UNITS:
         return "time", written_out
-    return last, unit
+    return last, unit or written_out or ""
 
 
 def role(header: str) -> str | None:
     """What a column is by its header alone: "time", an axis, or neither."""
-    name = name_and_unit(header)[0]
-    if name in TIME_NAMES:
+    name, unit = name_and_unit(header)
+    if name in TIME_NAMES or (unit in _TIME_UNITS and name.endswith(_TIME_ENDS)):
         return "time"
     if axis := _AXIS_NAME.fullmatch(name):
         return axis["axis"]
