@@ -76,6 +76,12 @@ AssumedForce = Annotated[
 PAIR = "COLUMN VALUE"
 
 
+def as_pair(words: Any) -> tuple[str, str]:
+    """The two words of an option of metavar `PAIR`."""
+    first, second = words
+    return str(first), str(second)
+
+
 class Command(TyperCommand):
     """A command whose options of metavar `PAIR` take two words each time."""
 

@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 import scipy.stats
 
+from tactileq.analysis.answers.imported import parse_map
 from tactileq.experiments.study.study import Study
 from tactileq.modeling import Scene
 from tactileq.stimuli.sets.recipe import Recipe
@@ -75,10 +76,31 @@ def test_every_fenced_block_is_run_by_some_test() -> None:
         "README.md": ["python"],
         "docs/models.md": ["python", "toml"],  # its recipe: tests/stimuli/sets/test_recipe.py
         "docs/your-data.md": ["python", "r"],
+        "docs/other-tables.md": ["toml", *["csv", "sh"] * 3, *["text", "sh"] * 2],
         "docs/method/publishing.md": ["python"],  # test_publish_command.py
         "docs/micro-controller.md": ["sh", "c", "c"],  # C: tests/stimuli/exports
         **{f"docs/{kind}-file.md": ["toml"] for kind in ("study", "scene", "recipe")},
     }
+
+
+def test_the_tables_of_five_programs_are_read(main: Run, tmp_path: Path) -> None:
+    page = "docs/other-tables.md"
+    tables = [*blocks_of(page, "csv"), *blocks_of(page, "text")]
+    lines = "".join(blocks_of(page, "sh")).splitlines()
+    assert len(tables) == len(lines) == 5
+    for table, line in zip(tables, lines, strict=True):
+        words = shlex.split(line)[1:]
+        (tmp_path / words[2]).write_text(table, encoding="utf-8")
+        done = main(*words, "--out", words[2].partition(".")[0])
+        assert done.returncode == 0, done.stderr
+        found = pd.read_csv(
+            tmp_path / words[2].partition(".")[0] / "tables/by_condition.tsv", sep="\t"
+        )
+        assert found["mean"].tolist() == [1.0 if "r.txt" in words[2] else 0.5, 0.5]
+    (tmp_path / "roles.toml").write_text(blocks_of(page, "toml")[0], encoding="utf-8")
+    mapping = parse_map([str(tmp_path / "roles.toml")])
+    assert (mapping.factors, mapping.right) == (("model", "session"), "1")
+    assert mapping.where == {"display": ("Trial", "Catch")}
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ docs/method/tables.md#numbers
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -102,7 +102,7 @@ class Numbers:
                     return name, cell
         return None
 
-    def style(self, path: object) -> Style:
+    def style(self, path: object, *, name_of: Callable[[str], str] = str) -> Style:
         """The one way that fits; the plainest where none does, since a cell is then refused.
 
         Raises
@@ -115,9 +115,9 @@ class Numbers:
             by_reading = {style.reading(cell): style for style in self.styles}
             readings = " or ".join(style.describe(cell) for style in by_reading.values())
             raise InputError(
-                f"expected one reading of the numbers in column {shown(name)} of {path}, got "
-                f"{shown(cell)}, which is {readings}; add decimal=point or decimal=comma to "
-                "--map."
+                f"expected one reading of the numbers in column {shown(name_of(name))} of "
+                f"{path}, got {shown(cell)}, which is {readings}; add decimal=point or "
+                "decimal=comma to --map."
             )
         return self.styles[0] if self.styles else self._nearest
 

@@ -144,7 +144,7 @@ class OtherTable:
         ]
         cells = dict(zip(shown_as, map(self.cells, columns), strict=True))
         seen = Numbers(cells, decimal=self.decimal)
-        return seen.style(self.path)
+        return seen.style(self.path, name_of=lambda name: self.names[self.place(name)] or name)
 
     def floats(self, name: str, style: Style, *, what: str = "a number") -> Floats:
         """The numbers of a column (n,), NaN where they are missing.
@@ -157,8 +157,9 @@ class OtherTable:
         cells = self.cells(name)
         values, wrong = converted(cells, style)
         if wrong >= 0:
+            where = f"column {shown(self.names[self.place(name)] or name)} of "
             raise InputError(
-                f"expected {what} in column {shown(self.names[self.place(name)])} of {self.where(self.lines[wrong])}, got "
+                f"expected {what} in {where}{self.where(self.lines[wrong])}, got "
                 f"{shown(cells[wrong])}; correct that cell."
             )
         return values

@@ -82,7 +82,7 @@ def _joined(name: str) -> str:
 
 
 def _time_or(name: str, unit: str) -> tuple[str, str]:
-    """The same; where only a unit is named, written out, that one: Second is the time, Volt in V."""
+    """The same; but where only a unit is named, written out: Second is time, Volt in V."""
     *others, last = [word for word in name.split("_") if word != "elapsed"] or ["time"]
     if others:
         return name, unit

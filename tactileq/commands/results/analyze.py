@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tactileq.options import PAIR, Out, Seed
+from tactileq.options import PAIR, Out, Seed, as_pair
 from tactileq.printing import progress, share_of, usable_recordings
 from tactileq.results import FolderResults
 from tactileq.workers import working
@@ -48,7 +48,7 @@ def analyze(
     where: Annotated[
         list[Any] | None,
         typer.Option(
-            parser=str,
+            parser=as_pair,
             metavar=PAIR,
             help="Only lines of tables with this value in this column; repeatable.",
         ),
