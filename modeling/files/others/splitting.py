@@ -164,9 +164,12 @@ def _with_quotes(
 
 
 def check_spans(lines: Sequence[Line], width: int, path: Path) -> None:
-    """Refuse a quoted cell that runs over lines which would be whole ones without its quotes."""
+    """Refuse a quoted cell over several lines with the separators of two rows or more.
+
+    Without its quotes these lines could be rows: an opening quote would have swallowed them.
+    """
     for line in lines:
-        if line.widths and min(line.widths[0], line.widths[-1]) >= width:
+        if line.widths and sum(line.widths) - len(line.widths) >= 2 * (width - 1):
             raise InputError(
                 f"expected one reading of {path}, line {line.number}, got a quote that either "
                 f"holds a cell of {len(line.widths)} lines or was not closed, so that lines are "

@@ -112,7 +112,12 @@ class OtherTable:
         place = self.place(name)
         self._check_row_names(place)
         for line in self.lines:
-            if 0 < line.given <= place:
+            is_short = 0 < line.given < len(self.names)
+            if is_short and (
+                line.given <= place
+                or not line.cells[place]
+                or any(self.separator in cell for cell in line.cells)
+            ):
                 raise InputError(
                     f"expected {counted(len(self.names), 'cell')} in {self.where(line)}, got "
                     f"{line.given} and none for {shown(name)}; complete the line, or remove it if "

@@ -178,6 +178,8 @@ def written(truth: Truth, dialect: Dialect, names: Sequence[str], rng: random.Ra
         lines[first:] = [[*cells, ""] for cells in lines[first:]]
     around = {"": "", "after": " ", "around": "  "}[dialect.blanks]
     if dialect.quoting == RAW:
+        if dialect.separator == " ":
+            return None  # in which no cell could be told from two, or from none
         joined = (dialect.separator + around).join
         table = "".join(f"{joined(cells)}\n" for cells in lines)
     else:
