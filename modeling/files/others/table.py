@@ -269,8 +269,8 @@ def _is_header(lines: Sequence[Line], wanted: Sequence[str]) -> bool:
     """Whether the first line names columns: its cells are no numbers and do not occur again."""
     for name in wanted:
         place = int(name[1:]) - 1
-        first, *below = [line.cells[place] for line in lines if place < len(line.cells)]
-        if is_number(first) or first in below:
+        cells = [line.cells[place] for line in lines if place < len(line.cells)]
+        if cells and (is_number(cells[0]) or cells[0] in cells[1:]):
             return False
     return True
 
@@ -440,7 +440,8 @@ def _check_lengths(lines: Sequence[Line], names: Sequence[str], path: Path) -> N
 def _ends_table(line: Line) -> bool:
     """Whether a last line is no row: a word alone, or END OF FILE."""
     words = " ".join(filter(None, line.cells))
-    alone = len(line.cells) == 1 and not is_number(words)
+    alone = len(line.cells) == 1 and words.isprintable() and not set("\t;,|") & set(words)
+    alone = alone and not is_number(words)
     return alone or words.casefold() in ("end of file", "eof")
 
 

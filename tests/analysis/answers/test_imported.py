@@ -146,3 +146,246 @@ def test_any_text_is_read_or_refused(tmp_path: Path, text: str) -> None:
         return
     assert found.answers["correct"].isin([0.0, 1.0]).all()
     assert len(found.answers) > 0
+
+
+def mean_by(found: ImportedAnswers, *columns: str) -> dict[object, float]:
+    """Mean of the measure, each trial counting once, by a column or under "all"."""
+    rows = found.answers.loc[found.answers.index.repeat(found.answers["count"])]
+    groups = rows.groupby(list(columns)) if columns else [(("all",), rows)]
+    return {key[0]: pytest.approx(own[found.measure].mean()) for key, own in groups}
+
+
+def test_true_and_false_and_codes(tmp_path: Path) -> None:
+    for right, wrong in (("true", "false"), ("TRUE", "FALSE"), ("True", '"False"')):
+        found = load(tmp_path, f"a,b\nx,{right}\nx,{wrong}\ny,{right}\n", "correct=b,factor=a")
+        assert mean_by(found, "a") == {"x": 0.5, "y": 1.0}
+    text = "a,b\nx,1\nx,2\ny,1\ny,3\ny,\n"
+    with refused(InputError, expected=["0 or 1", "line 3"], got=["'2'", "--right"]):
+        load(tmp_path, text, "correct=b,factor=a")
+    (tmp_path / "P01.csv").write_text(text)
+    found = load_imported([tmp_path / "P01.csv"], parse_map("correct=b,factor=a", right="1"))
+    assert mean_by(found, "a") == {"x": 0.5, "y": 0.5}
+    assert found.missed == 1
+    assert any("1 (2), 2 (1), 3 (1)" in note for note in found.notes)
+
+
+def test_only_lines_that_fit_are_trials(tmp_path: Path) -> None:
+    (tmp_path / "P01.csv").write_text(
+        "phase,block,hit\nmain,1,1\nmain,2,0\ntraining,1,x\nmain,3,0\n"
+    )
+    where = [("phase", "MAIN"), ("block", "1"), ("block", "2.0")]
+    found = load_imported([tmp_path / "P01.csv"], parse_map("correct=hit", where=where))
+    assert found.answers["correct"].tolist() == [1.0, 0.0]
+    assert any("2 lines" in note and "--where" in note for note in found.notes)
+    with refused(InputError, expected=["'phase'", "pilot"], got="training"):
+        load_imported([tmp_path / "P01.csv"], parse_map("correct=hit", where=[("phase", "pilot")]))
+
+
+def test_lines_that_are_no_trials_are_counted(tmp_path: Path) -> None:
+    text = "model,hit,key\nfull,1,l\n,,space\nmodel,hit,key\nsimple,0,r\nfull,,\nEND OF FILE,,\n"
+    found = load(tmp_path, text, "correct=hit,factor=model")
+    assert mean_by(found, "model") == {"full": 1.0, "simple": 0.0}
+    assert found.missed == 1
+    told = " ".join(found.notes)
+    assert all(f"line {number}" in told for number in (3, 4, 7))
+    with refused(InputError, expected=["model", "line 2"], got=["none", "--where"]):
+        load(tmp_path, "model,hit\n,1\n", "correct=hit,factor=model")
+    questions = (
+        'ID,Q1\n"Your, ID",How rough?\n"{""ImportId"":""ID""}","{""ImportId"":""QID1""}"\na,3\n'
+    )
+    found = load(tmp_path, questions, "participant=ID,value=Q1")
+    assert found.answers["value"].tolist() == [3.0]
+
+
+def test_words_that_are_spelt_like_missing_values_are_names(tmp_path: Path) -> None:
+    text = "p,a\ncork,cork\nfelt,none\nfelt,None\nnone,none\nNaN,\n"
+    found = load(tmp_path, text, "presented=p,answered=a")
+    assert mean_by(found) == {"all": 0.5}
+    assert found.presented == ("cork", "felt", "none")
+    assert mean_by(load(tmp_path, "f,c\nNone,1\nForce,0\n", "correct=c,factor=f"), "f") == {
+        "Force": 0.0,
+        "None": 1.0,
+    }
+    for word in ("NA", "null", "."):
+        with refused(InputError, expected="line 3", got=[f"'{word}'", "or"]):
+            load(tmp_path, f"p,a\ncork,felt\nfelt,{word}\n", "presented=p,answered=a")
+
+
+def test_an_answer_that_was_never_presented_is_no_alternative(tmp_path: Path) -> None:
+    text = "p,a\n" + "".join(f"{c},{c}\n{c},don't know\n" for c in "abcd")
+    found = load(tmp_path, text, "presented=p,answered=a")
+    assert found.presented == tuple("abcd")
+    assert found.classes == (*"abcd", "don't know")
+    assert any("4 times" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("sums", ["All", "Total", "row total"])
+def test_sums_are_no_class(tmp_path: Path, sums: str) -> None:
+    rows = {"a": (7, 1, 2), "b": (3, 5, 2), "c": (2, 4, 4)}
+    whole = [*(f"{name},{','.join(map(str, row))},{sum(row)}" for name, row in rows.items())]
+    whole = [f"x,a,b,c,{sums}", *whole, f"{sums},12,10,8,30"]
+    for lines in (whole, whole[:-1], [line.rpartition(",")[0] for line in whole]):
+        found = load(tmp_path, "\n".join(lines) + "\n", "")
+        assert found.presented == ("a", "b", "c")
+        assert mean_by(found) == {"all": 16 / 30}
+        assert any(sums in note for note in found.notes)
+    with refused(InputError, expected="class", got=f"'{sums}'"):
+        load(tmp_path, "\n".join(whole).replace(",30", ",31"), "")
+    with refused(InputError, expected="class", got="'d'"):
+        load(tmp_path, "\n".join(whole).replace(sums, "d"), "")
+
+
+def test_cells_stay_under_their_names(tmp_path: Path) -> None:
+    found = load(tmp_path, ",a,,b,c\na,7,,1,2\nb,3,,5,2\nc,2,,4,4\n", "")
+    counts = found.answers.set_index(["presented", "answered"])["count"]
+    assert counts["a"].to_dict() == {"a": 7, "b": 1, "c": 2}
+    with refused(InputError, expected="above each column", got=["'9'", "line 2"]):
+        load(tmp_path, ",a,,b,c\na,7,9,1,2\nb,3,,5,2\nc,2,,4,4\n", "")
+
+
+@pytest.mark.parametrize(
+    ("text", "mapping", "mean"),
+    [
+        ("rt;m\n980.5;a\n1,020;a\n", "value=rt", 1000.25),
+        ("rt;m\n980,5;a\n1.020;a\n", "value=rt", 1000.25),
+        ('rt,m\n"1\'000",a\n900,a\n', "value=rt", 950.0),
+        ("rt\tm\n1 000\ta\n900\ta\n", "value=rt", 950.0),
+        ("rt\tm\n-1.5e3\ta\n+.5\ta\n", "value=rt", -749.75),
+        ("rt\tm\n\u22121,5\ta\n2,5\ta\n", "value=rt", 0.5),
+        ("rt\tm\n1,020\ta\n980\ta\n", "value=rt,decimal=point", 1000.0),
+        ("rt\tm\n1,020\ta\n980\ta\n", "value=rt,decimal=comma", 490.51),
+    ],
+)
+def test_the_decimal_sign_is_decided_for_the_column(
+    tmp_path: Path, text: str, mapping: str, mean: float
+) -> None:
+    assert mean_by(load(tmp_path, text, mapping)) == {"all": mean}
+
+
+@pytest.mark.parametrize(
+    ("text", "mapping", "readings"),
+    [
+        ("rt\tm\n900\ta\n1,020\ta\n", "value=rt", ["'1,020'", "1020", "1.02"]),
+        ("f;c\n1;1\n10;1\n1.000;0\n", "correct=c,factor=f", ["'1.000'", "1000", "is 1 "]),
+        ('f,c\n1,1\n10,1\n"1,000",0\n', "correct=c,factor=f", ["'1,000'", "1000", "is 1 "]),
+    ],
+)
+def test_what_may_be_a_thousand_is_refused_with_both_readings(
+    tmp_path: Path, text: str, mapping: str, readings: list[str]
+) -> None:
+    with refused(InputError, expected="one reading", got=[*readings, "decimal=point"]):
+        load(tmp_path, text, mapping)
+    levels = load(tmp_path, text, f"{mapping},decimal=point")
+    assert len(levels.answers) == text.count("\n") - 1
+
+
+@pytest.mark.parametrize("cell", ["1_1", "inf", "0x10", "\uff11\uff12", "1,0,0", "1 2 3", "--1"])
+def test_what_only_a_program_reads_is_no_number(tmp_path: Path, cell: str) -> None:
+    with refused(InputError, expected=["number", "line 3"], got=repr(cell)):
+        load(tmp_path, f"v;m\n1;a\n{cell};a\n", "value=v")
+
+
+def test_a_quote_that_nobody_closed_swallows_no_lines(tmp_path: Path) -> None:
+    rows = "".join(f'101,{c},"too rough,{h}\n102,{c},ok,{h}\n' for c in "ab" for h in (0, 1))
+    with refused(InputError, expected=["quotes", "line 2"], got="not closed"):
+        load(tmp_path, "id,c,note,hit\n" + rows, "participant=id,correct=hit,factor=c")
+    closed = 'id,c,note,hit\n1,a,"too rough,0\n1,b,fine,1\n1,b,too smooth",1\n'
+    with refused(InputError, expected=["one reading", "line 2"], got="either"):
+        load(tmp_path, closed, "participant=id,correct=hit,factor=c")
+    whole = 'id,c,note,hit\n1,a,"too rough,\n""really""",0\n1,b,5" wide,1\n'
+    found = load(tmp_path, whole, "participant=id,correct=hit,factor=c")
+    assert found.answers["correct"].tolist() == [0.0, 1.0]
+
+
+def test_names_of_rows(tmp_path: Path) -> None:
+    lines = ['"id"\t"m"\t"rt"', '"1"\t101\t"a"\t1.9', '"2"\t101\t"b"\t0.7', '"3"\t102\t"a"\t1.25']
+    found = load(tmp_path, "\n".join(lines), "participant=id,value=rt")
+    assert mean_by(found, "participant_id") == {"101": 1.3, "102": 1.25}
+    assert any("name of a row" in note for note in found.notes)
+    blank = [lines[0] + '\t"note"', *(f'{line}\t""' for line in lines[1:])]
+    with refused(InputError, expected="line 2", got=["either", "or"]):
+        load(tmp_path, "\n".join(blank), "participant=id,value=rt")
+    with refused(InputError, expected=["3 cells", "line 2"], got=4):
+        load(
+            tmp_path, "id,m,rt\n1,really, rough,2\n2,really, smooth,3\n", "participant=id,value=rt"
+        )
+
+
+def test_the_same_file_under_two_names(tmp_path: Path) -> None:
+    files = []
+    for name in ("P01", "P02", "copy of P01"):
+        rows = "".join(f"{'ab'[i % 2]},{(i + ord(name[-1])) % 3 % 2}\n" for i in range(12))
+        files.append(tmp_path / f"{name}.csv")
+        files[-1].write_text("m,hit\n" + rows)
+    files[-1].write_bytes(files[0].read_bytes().replace(b"\n", b"\r\n"))
+    load_imported(files[:2], parse_map("correct=hit,factor=m"))
+    with refused(InputError, expected="different", got=[files[0], files[2]]):
+        load_imported(files, parse_map("correct=hit,factor=m"))
+    for path in (files[0], files[2]):
+        path.write_text("m,hit\na,1\nb,1\n")  # as everybody may answer
+    assert any("1 pair" in n for n in load_imported(files, parse_map("correct=hit")).notes)
+
+
+def test_a_table_that_was_joined_with_itself_is_named(tmp_path: Path) -> None:
+    rows = "101,a,1\n101,b,0\n102,a,0\n"
+    found = load(tmp_path, "id,m,hit\n" + rows * 2, "participant=id,correct=hit,factor=m")
+    assert any("lines 5 to 7" in note and "lines 2 to 4" in note for note in found.notes)
+
+
+def test_files_are_sessions_of_a_participant(tmp_path: Path) -> None:
+    files = []
+    for who, day in (("P01", "mon"), ("P02", "mon"), ("P01", "tue"), ("P02", "tue")):
+        files.append(tmp_path / f"{who}_{day}.csv")
+        files[-1].write_text(f"id,hit\n{who},{int(day == 'tue')}\n{who},1\n")
+    with refused(InputError, expected="once", got=["P01", "factor=session"]):
+        load_imported(files, parse_map("participant=id,correct=hit"))
+    for factor, levels in (("session", ("1", "2")), ("file", ("mon", "tue"))):
+        found = load_imported(files, parse_map(f"participant=id,correct=hit,factor={factor}"))
+        assert mean_by(found, factor) == dict(zip(levels, (0.5, 1.0), strict=True))
+
+
+def test_without_a_right_answer_the_share_of_one_is_read(tmp_path: Path) -> None:
+    text = "level,a\n1,test\n1,standard\n2,test\n2,test\n"
+    (tmp_path / "P01.csv").write_text(text)
+    for right, shares in (("standard", (0.5, 0.0)), ("test", (0.5, 1.0)), ("", (0.5, 1.0))):
+        mapping = parse_map("answered=a,factor=level", right=right)
+        found = load_imported([tmp_path / "P01.csv"], mapping)
+        assert found.response == (right or "test")
+        assert mean_by(found, "level") == dict(zip("12", shares, strict=True))
+    (tmp_path / "P01.csv").write_text(text + "2,neither\n")
+    with refused(InputError, expected=["neither", "test", "--right"], got="3 answers"):
+        load_imported([tmp_path / "P01.csv"], parse_map("answered=a,factor=level"))
+
+
+def test_names_are_compared_by_what_they_say(tmp_path: Path) -> None:
+    text = "\u53c2\u52a0\u8005,\u30ab\u3099\u30e9\u30b9,x\nA,cafe\u0301,1\nA,caf\u00e9,0\n"
+    found = load(
+        tmp_path, text, "participant=\u53c2\u52a0\u8005,factor=\u30ac\u30e9\u30b9,correct=x"
+    )
+    assert mean_by(found, "\u30ac\u30e9\u30b9") == {"caf\u00e9": 0.5}
+    found = load(tmp_path, "\uff32\uff34,x\n1,a\n", "value=rt")
+    assert found.answers["value"].tolist() == [1.0]
+
+
+def test_a_map_of_a_laboratory(tmp_path: Path) -> None:
+    (tmp_path / "roles.toml").write_text(
+        'value = "How similar, from 0 to 100?"\nfactor = "model"\n[where]\nphase = "main"\n'
+    )
+    whole = 'value="How similar, from 0 to 100?"'
+    plain = "value=How similar, from 0 to 100?,factor=model"
+    expected = parse_map(["factor=model", whole], where=[("phase", "main")])
+    assert parse_map(str(tmp_path / "roles.toml")) == expected
+    assert parse_map(plain, where=[("phase", "main")]) == expected
+    assert parse_map('value="the ""right"" one"').value == 'the "right" one'
+    for text, got in (("valeu = 'a'", "valeu"), ("value = ['a', 'b']", "'b'"), ("where = 3", "3")):
+        (tmp_path / "roles.toml").write_text(text)
+        with refused(InputError, expected=tmp_path / "roles.toml", got=got):
+            parse_map(str(tmp_path / "roles.toml"))
+
+
+def test_columns_by_number(tmp_path: Path) -> None:
+    for text in ("full 1 0.5\nsimple 2 0.75\nfull 2 0.25\n", "m c rt\nfull 1 0.5\nsimple 2 0.75\n"):
+        found = load(tmp_path, text, "factor=#1,value=#3")
+        assert found.answers["value"].tolist()[:2] == [0.5, 0.75]
+    with refused(InputError, expected="#7", got="3 columns"):
+        load(tmp_path, "full 1 0.5\nfull 2 0.25\n", "value=#7")
