@@ -568,7 +568,7 @@ def _check_run(lines: Sequence[Line], run: _Run, path: Path) -> None:
     for line in lines[: run.start]:
         inside = [line.cells[i] for i in run.columns if i < len(line.cells)]
         if len(inside) == len(run.columns) and all(map(is_number, inside)):
-            raise _damaged(line, run, path)
+            raise _damaged(lines[run.start - 1], run, path)
 
 
 def _damaged(line: Line, run: _Run, path: Path) -> InputError:
