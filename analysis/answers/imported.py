@@ -458,7 +458,7 @@ class _Rows:
                 )
             chosen &= fits
         places = [self._where(i) for i in np.flatnonzero(~chosen).tolist()]
-        self.found.leave_out("do not fit --where", places)
+        self.found.leave_out("have another value than --where names", places)
         return chosen
 
     @cached_property

@@ -7,6 +7,7 @@ both. Only columns that are asked for have to be sound. docs/method/tables.md#di
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,7 +19,14 @@ import numpy as np
 
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import InputError, counted, shortened, shown
-from tactileq.modeling.files.others.numbers import NO_NUMBER, Numbers, Style, converted, is_number
+from tactileq.modeling.files.others.numbers import (
+    NO_NUMBER,
+    Numbers,
+    Style,
+    converted,
+    fitting,
+    is_number,
+)
 from tactileq.modeling.files.others.splitting import (
     SEPARATORS,
     Line,
@@ -30,13 +38,15 @@ from tactileq.modeling.files.others.splitting import (
 
 MOST_NAMES = 200  # characters of the names of columns that a refusal lists
 _MOST_PLACES = 3  # lines that a note names
+_MOST_ABOVE = 3  # lines of names between the rest of a row and the first row
 _SAMPLED = 200  # lines of numbers by which columns of numbers are found
+_BRACKETED = re.compile(r"[\[(](.*)[\])]")
 _IMPORT_ID = '{"importid"'  # Qualtrics' third line; its second one holds the questions' texts
 
 
 def same_name(name: str) -> str:
     """What two spellings of a column's name have in common: letters' case, width, composition."""
-    return unicodedata.normalize("NFKC", name).casefold().strip()
+    return unicodedata.normalize("NFKC", name).casefold().strip("\ufeff\u200b \t\u00a0")
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,11 +191,12 @@ class OtherTable:
 
 
 def left_out_sentence(what: str, places: Sequence[str]) -> str:
-    """That lines were left out, and why: `2 lines left out that repeat the header (line 9; …).`"""
+    """That lines were left out, and why: `2 lines were left out: they repeat the header (…).`"""
+    if len(places) != 1:
+        return f"{len(places)} lines were left out: they {what} ({listed(places)})."
     verb, _, rest = what.partition(" ")
-    if len(places) == 1:
-        what = f"{'has' if verb == 'have' else f'{verb}s'} {rest}"
-    return f"{counted(len(places), 'line')} left out that {what} ({listed(places)})."
+    verb = "has" if verb == "have" else f"{verb}s"
+    return f"1 line was left out: it {verb} {rest} ({places[0]})."
 
 
 def listed(places: Sequence[str]) -> str:
@@ -319,8 +330,10 @@ def _parsed(
     separators = [text.separator] if text.separator else list(SEPARATORS)
     often = text.content.count
     for separator in sorted(separators, key=lambda one: (one == " ", -often(one))):
-        if separator not in text.content and found:
-            continue
+        if any(one.separator not in text.content for one in found) and (
+            separator not in text.content
+        ):
+            continue  # a table of one column is the same by all that it does not hold
         if separator == " " and any(one.width > 1 for one in found):
             continue  # blanks stand in texts, too
         try:
@@ -482,20 +495,21 @@ def read_number_table(
 
     def header_in(lines: Sequence[Line]) -> int | None:
         run = _run_of_numbers(lines)
-        above = max(run.start - 1, 0) if run else 0
-        cells = [cell for cell in lines[above].cells if cell] if run else []
-        holds_numbers = 2 * sum(map(is_number, cells)) > len(cells)
-        return None if run is None or (holds_numbers and run.start) else above
+        if run is None:
+            return None
+        named = [place for place in range(run.start) if not _holds_numbers(lines[place])]
+        return named[-1] if named else (None if run.start else 0)
 
-    parsed = _parsed(text, path, header_in, comments=True)
+    parsed = _parsed(text, path, header_in)
     lines, run = parsed.lines, _run_of_numbers(parsed.lines)
     if run is None:
+        got = f"{counted(len(lines), 'line')} without rows of numbers" if lines else "an empty file"
         raise InputError(
-            f"expected a header and rows of numbers in {path.name}, got "
-            f"{counted(len(lines), 'line')} without rows of numbers; export or record it again."
+            f"expected a header and rows of numbers in {path.name}, got {got}; export or record it "
+            "again."
         )
     _check_run(lines, run, path)
-    header, names = _names_above(lines[: run.start], wanted, is_unit=is_unit)
+    header, names = _names_above(lines[: run.start], run, wanted=wanted, is_unit=is_unit)
     if not names:
         if not any(map(number_of, wanted)):
             raise InputError(
@@ -505,11 +519,17 @@ def read_number_table(
         names = [f"#{i}" for i in range(1, run.width + 1)]
     first = Line(header.number if header else lines[run.start].number, names)
     table = _table(path, text, parsed.separator, [first, *lines[run.start : run.stop]], header=0)
-    above = [line.number for line in lines[: run.start] if line.number < first.number]
+    before = [line for line in lines[: run.start] if not line.cells[0].startswith("#")]
+    above = [line.number for line in before if line.number < first.number]
     below = [line.number for line in lines[run.stop :]]
     left_out = {"stand above the header": above, "stand below the numbers": below}
     numeric = tuple(place for place in run.columns if place < len(table.names))
     return replace(table, left_out={**left_out, **table.left_out}, numeric=numeric)
+
+
+def _holds_numbers(line: Line) -> bool:
+    """Whether most of its cells are numbers."""
+    return 2 * sum(map(is_number, line.cells)) > line.width
 
 
 @dataclass(frozen=True)
@@ -547,9 +567,11 @@ def _run_of_numbers(lines: Sequence[Line]) -> _Run | None:
     shares = [np.mean([is_number(line.cells[i]) for line in sample]) for i in range(most)]
     columns = tuple(place for place, share in enumerate(shares) if share >= 0.5)
     run = _Run(start, stop, most, columns)
-    if not columns:
-        return None
+    if not columns or (most == 1 and not fitting([line.cells[0] for line in sample[-9:]])):
+        return None  # 0.5,1.25 is no number, though it looks like one
     rows = [place for place in range(start, stop) if run.holds(lines[place])]
+    if len(rows) > 2 and rows[0] + 1 < rows[1] and rows[1] - rows[0] <= _MOST_ABOVE:
+        del rows[0]  # the rest of a row that was sent before the names were
     return replace(run, start=rows[0], stop=rows[-1] + 1) if rows else None
 
 
@@ -558,42 +580,79 @@ def _check_run(lines: Sequence[Line], run: _Run, path: Path) -> None:
     for line in lines[run.stop :]:
         inside = [line.cells[i] for i in run.columns if len(line.cells) == run.width]
         others = [cell for cell in inside if not is_number(cell)]
+        if inside and not others:
+            raise InputError(
+                f"expected one run of rows of numbers in {path.name}, got more of them from line "
+                f"{line.number} on; cut the file into one for each."
+            )
         if inside and len(others) < len(inside):
             raise InputError(
                 f"expected numbers in line {line.number} of {path.name}, got {shown(others[0])}; "
-                "correct that cell, or record again."
+                "correct that cell, or remove the line if it is no row."
             )
         if any(map(is_number, line.cells)):
             raise _damaged(line, run, path)
-    for line in lines[: run.start]:
-        inside = [line.cells[i] for i in run.columns if i < len(line.cells)]
-        if len(inside) == len(run.columns) and all(map(is_number, inside)):
-            raise _damaged(lines[run.start - 1], run, path)
+    holding = [
+        place
+        for place, line in enumerate(lines[: run.start])
+        if run.holds(line) or sum(map(is_number, line.cells)) > max(1, run.width // 2)
+    ]
+    if len(holding) > 1:
+        after = lines[holding[0] : run.start]
+        raise _damaged(next(line for line in after if not run.holds(line)), run, path)
 
 
 def _damaged(line: Line, run: _Run, path: Path) -> InputError:
+    got = str(len(line.cells)) if len(line.cells) != run.width else shown(line.cells[0])
     return InputError(
-        f"expected {counted(run.width, 'value')} in line {line.number} of {path.name}, got "
-        f"{len(line.cells)}; the file is truncated or damaged, export or record it again."
+        f"expected {counted(run.width, 'value')} in line {line.number} of {path.name}, got {got}; "
+        "the file is truncated or damaged, export or record it again, or cut it there."
     )
 
 
 def _names_above(
-    lines: Sequence[Line], wanted: Sequence[str], *, is_unit: Callable[[str], bool]
+    lines: Sequence[Line], run: _Run, *, wanted: Sequence[str], is_unit: Callable[[str], bool]
 ) -> tuple[Line | None, list[str]]:
-    """The line of names above the numbers, its names with the units below it."""
+    """The line of names above the numbers, its names with the units below it.
+
+    A line that begins with # is one of names only where there is no other.
+    """
     named = {same_name(name) for name in wanted if number_of(name) is None}
-    if not lines:
+    plain = [line for line in lines if not line.cells[0].startswith("#")] or [
+        replace(line, cells=[line.cells[0].lstrip("# "), *line.cells[1:]]) for line in lines
+    ]
+    plain = [line for line in plain if not run.holds(line)]
+    by_number = bool(wanted) and not named
+    if not plain or (by_number and len(plain[-1].cells) != run.width):
         return None, []
-    fits = [line for line in lines if named <= set(map(same_name, line.cells))]
-    last = [cell for cell in lines[-1].cells if cell]
-    before = lines[-2] if len(lines) > 1 else None
-    is_header = lines[-1] in fits if named else not before or any(map(is_number, before.cells))
-    units = lines[-1].cells if before and not is_header and all(map(is_unit, last)) else []
-    above = lines[:-1] if units else lines
-    header = fits[-1] if named and fits else above[-1]
+    fits = [line for line in plain if named and named <= set(map(same_name, line.cells))]
+    units = _units(plain, fits, is_unit=is_unit)
+    above = plain[:-1] if units else plain
+    alike = len(above) > 1 and above[-1].width > 1 and len(set(above[-1].cells)) == 1
+    header = fits[-1] if fits else above[-2 if alike else -1]
     with_units = [
-        f"{name} ({unit.strip('()[] ')})" if unit else name
+        f"{name} ({_bare(unit)})" if unit else name
         for name, unit in zip_longest(header.cells[: header.width], units, fillvalue="")
     ]
     return header, with_units
+
+
+def _bare(unit: str) -> str:
+    """A unit without brackets around it."""
+    found = _BRACKETED.fullmatch(unit)
+    return found[1] if found else unit
+
+
+def _units(
+    lines: Sequence[Line], fits: Sequence[Line], *, is_unit: Callable[[str], bool]
+) -> list[str]:
+    """The cells of a last line of units below one of names; none where there is no such line."""
+    if len(lines) < 2 or lines[-1] in fits:
+        return []
+    cells = [cell for cell in lines[-1].cells if cell]
+    known = sum(map(is_unit, cells))
+    before = lines[-2]
+    if lines[-2] in fits or before.width == lines[-1].width:
+        has_numbers = lines[-2] not in fits and any(map(is_number, before.cells))
+        return list(lines[-1].cells) if known and not has_numbers else []
+    return []

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
@@ -33,11 +34,21 @@ from tactileq.rig.recording.importing.headers import (
     overrange,
     role,
 )
-from tactileq.rig.recording.importing.times import TimeColumn, since_first, unwrapped
+from tactileq.rig.recording.importing.times import (
+    RATE_TOLERANCE,
+    TimeColumn,
+    since_first,
+    unwrapped,
+)
 
 Axis = Literal["x", "y", "z", "dft321"]
 AXES: tuple[Axis, ...] = ("x", "y", "z", "dft321")
 ROLES = ("time", "x", "y", "z")
+MOST_CHANNELS = 12
+# Words of headers that are of no acceleration: not taken unless they are named.
+_OTHERS = re.compile(
+    r"gyro|mag|g[xyz]\b|temp|weight|mass|load|force|press|humid|pos|veloc|speed|angle|volume"
+)
 EXAMPLE = "time=Zeit,z=Beschl_Z"
 _IN_BRACKETS = re.compile(r"[\[(][^\])]*[\])]")
 
@@ -58,6 +69,11 @@ def parse_columns(texts: str | Sequence[str]) -> dict[str, str]:
             "them, since each line is a sample."
         )
     named = {name: columns[0] for name, columns in found.columns.items()}
+    if len(set(named.values())) < len(named):
+        raise InputError(
+            f"expected each column once in the map, got {shown(', '.join(named.values()))}; "
+            f"write it like {EXAMPLE}."
+        )
     return named | ({"decimal": found.decimal} if found.decimal else {})
 
 
@@ -107,6 +123,7 @@ def read_log(path: Path, named: Mapping[str, str], axis: Axis | None) -> CsvLog:
     columns = {name: wanted for name, wanted in named.items() if name != "decimal"}
     table = read_number_table(path, "a CSV file", wanted=tuple(columns.values()), is_unit=_is_unit)
     table = replace(table, decimal=named.get("decimal", ""))
+    _check_one_channel(table)
     headers = _headers(table, columns)
     times = [place for place, name in headers.items() if role(name) == "time"]
     clocks = [place for place in times if place not in table.numeric]
@@ -169,17 +186,29 @@ def _axes(
     if axis is not None:
         return _places_of(path, headers, axis)
     numeric = {place: name for place, name in headers.items() if place in table.numeric}
-    accelerations = [place for place, name in numeric.items() if is_acceleration(name)]
+    others = [place for place, name in numeric.items() if _OTHERS.search(name.casefold())]
+    accelerations = [p for p, name in numeric.items() if is_acceleration(name) and p not in others]
     if len(accelerations) == 1 and not any(
         role(name) for place, name in numeric.items() if place not in accelerations
     ):
         return accelerations
+    if not numeric:
+        raise InputError(
+            f"expected a column of numbers beside the times in {path.name}, got none; name one "
+            "with --map, or correct its cells."
+        )
     if len(numeric) != 1:
         raise InputError(
             f"expected --axis x, y, z or dft321 for {path.name}, got none and the columns "
             f"{shortened(', '.join(numeric.values()), longest=120)}; choose an axis."
         )
-    return list(numeric)
+    [(place, name)] = numeric.items()
+    if place in others:
+        raise InputError(
+            f"expected a column of acceleration in {path.name}, got only {shown(name)}; name it "
+            "with --map if it is one."
+        )
+    return [place]
 
 
 def _places_of(path: Path, headers: Mapping[int, str], axis: Axis) -> list[int]:
@@ -226,10 +255,40 @@ def _time(table: OtherTable, place: int, header: str, style: Style) -> TimeColum
 
 
 def _best(every: Sequence[TimeColumn]) -> TimeColumn | None:
-    """The first column of times that gives a rate, else in its longest part, else the first one."""
-    whole = [time for time in every if time.has_a_rate()]
+    """The finest column of times that gives a rate, else in its longest part, else the first one.
+
+    Raises
+    ------
+    InputError
+        If two give rates that differ: the log may hold two tables.
+    """
+    whole = sorted((time for time in every if time.has_a_rate()), key=lambda time: time.repeats)
+    for other in whole[1:]:
+        ratio = other.rate_hz() / whole[0].rate_hz()
+        if not other.repeats and abs(ratio - 1) > RATE_TOLERANCE:
+            raise InputError(
+                f"expected one rate in {other.file}, got {whole[0].rate_hz():.6g} Hz by "
+                f"{shown(whole[0].name)} and {other.rate_hz():.6g} Hz by {shown(other.name)}; name "
+                "the right one with --time-column."
+            )
     in_part = [time for time in every if time.without_gaps(None)[1]]
     return next(iter((*whole, *in_part, *every)), None)
+
+
+def _check_one_channel(table: OtherTable) -> None:
+    """Refuse a log in long format, where a text says of which channel each row is."""
+    rows = len(table.lines)
+    for place, name in enumerate(table.names):
+        if not name or place in table.numeric:
+            continue
+        cells = [line.cells[place] for line in table.lines]
+        changes = sum(a != b for a, b in pairwise(cells))
+        if 2 <= len(set(cells)) <= MOST_CHANNELS and changes > rows / 4:
+            kinds = shortened(", ".join(sorted(set(cells))))
+            raise InputError(
+                f"expected rows of one channel in {table.path.name}, got {kinds} in turn in column "
+                f"{shown(name)}; export each channel as a column or a file of its own."
+            )
 
 
 def _warnings(table: OtherTable, *, taken: set[int], clocks: Sequence[str], only: str) -> list[str]:

@@ -32,7 +32,7 @@ _UNITS = {spelling: unit for unit, spellings in SPELLINGS.items() for spelling i
 _TIME_UNITS = ("s", "ms", "us", "ns")
 TIME_NAMES = {"time", "t", "timestamp"}
 _TIME_ENDS = ("_time", "_timestamp", "_seconds")  # s1_timestamp (ms)
-_BRACKETS = re.compile(r"[\[(]([^\[\]()]*(?:\([^()]*\))?[^\[\]()]*)[\])]")
+_BRACKETS = re.compile(r"[\[({<]([^\[\]()]*(?:\([^()]*\))?[^\[\]()]*)[\])}>]")
 _BETWEEN = re.compile(r"\s+in\s+|\s*[/,]\s*|[\s_]+")  # a name and its unit: z in g, t/s, x_g
 _ACC = r"acc(?:el(?:eration|erometer)?)?"
 # x, ax, accx, linear_acceleration_x, x_axis, x_acceleration; gx is a gyroscope's, accuracy no y
@@ -58,6 +58,8 @@ def name_and_unit(header: str) -> tuple[str, str]:
     A unit in brackets that is not known is as the header has it, in small letters.
     """
     text = _plain(header)
+    if (alone := known_unit(text)) in (*_ACCELERATION_UNITS, "V", "mV"):
+        return text, alone or ""
     for name, unit in _ways_to_split(text):
         if found := known_unit(unit):
             return _time_or(_joined(name), found)
@@ -119,7 +121,7 @@ def is_acceleration(header: str) -> bool:
 OVERLOAD = 9.9e37
 _OVERRANGE = {
     *("ol", "0l", "ovl", "ovld", "ovr", "ovrng", "over", "overrange", "overflow", "overload"),
-    *("ofl", "oflow", "1#inf", "inf", "infinity"),
+    *("ofl", "oflow", "1#inf", "inf", "infinity", "∞"),
 }
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from unicodedata import normalize
 
 from tactileq.modeling import InputError
 from tactileq.modeling.files.columns import Column, chosen
@@ -56,27 +57,30 @@ def labels_from_table(
     rows: dict[str, tuple[str, dict[str, str]]] = {}
     for where, row in read_user_cells(table, LABEL_COLUMNS, "labels", only=True):
         typed(row, LABEL_COLUMNS[:1], where)  # others may be filled in later
-        if row["file"] in rows:
+        file = normalize("NFC", row["file"])  # macOS decomposes names of files
+        if file in rows:
             raise InputError(
                 f"expected one row for {row['file']} in {table}, got several; remove the wrong one."
             )
-        rows[row["file"]] = where, row
+        rows[file] = where, row
     fallback = texture or table.parent.resolve().name
     used, labels = set(), []
     for path in paths:
-        if not (found := rows.get(path.name) or rows.get(str(path))):
+        names = (normalize("NFC", path.name), normalize("NFC", str(path)))
+        name = next((name for name in names if name in rows), "")
+        if not name:
             raise InputError(
                 f"expected a row for {path.name} in {table}, got none; add its speed and force."
             )
-        where, row = found
-        used.add(row["file"])
+        where, row = rows[name]
+        used.add(name)
         labels.append(_label(typed(row, LABEL_COLUMNS, where), texture=fallback))
     return labels, tuple(file for file in rows if file not in used)
 
 
 def _label(row: Mapping[str, Any], *, texture: str) -> Label:
     return Label(
-        row["texture"] or texture,
+        normalize("NFC", row["texture"] or texture),
         row["speed_mm_s"],
         row["force_n"],
         row["repeat"] or 1,

@@ -144,6 +144,11 @@ class TimeColumn:
             "record again if they are needed."
         )
 
+    @property
+    def repeats(self) -> int:
+        """How many stamps are the same as the one before."""
+        return int((self.steps() == 0).sum())
+
     def steps(self) -> Floats:
         """From each time to the next."""
         return np.diff(self.values)
@@ -153,7 +158,7 @@ class TimeColumn:
         steps = self.steps()
         if not (np.isfinite(steps).all() and (steps > 0).any()):
             return False
-        both = np.array([steps.mean(), np.median(steps[steps > 0])])
+        both = np.array([_mean_step(self.values), np.median(steps[steps > 0])])
         ratios = rate_hz * np.outer(both, list(SECONDS_PER_UNIT.values()))
         return bool((np.abs(ratios - 1) <= RATE_TOLERANCE).any())
 
@@ -169,7 +174,9 @@ class TimeColumn:
         if not rises or counts or self.unit not in SECONDS_PER_UNIT:
             return None
         # Coarse time stamps keep the mean step, lost samples the typical one.
-        mean, typical = float(steps.mean()), float(np.median(steps[steps > 0]))
+        mean, typical = _mean_step(self.values), float(np.median(steps[steps > 0]))
+        if np.isnan(mean):
+            return None
         by_unit = self._rates_hz(mean)
         ratios = [rate_hz / hz * part for hz in by_unit.values() for part in (1, typical / mean)]
         if not by_unit or any(abs(ratio - 1) <= RATE_TOLERANCE for ratio in ratios):
@@ -237,7 +244,12 @@ class TimeColumn:
                 f"expected rising times in {self.file}, got some that fall, repeat or are not "
                 "finite; repair the file or give --rate."
             )
-        mean_step = span / steps.size
+        mean_step = _mean_step(time_s)
+        if np.isnan(mean_step):
+            raise InputError(
+                f"expected times that change often enough to give a rate in {self.file}, got "
+                f"{counted(int((steps > 0).sum()), 'change')} in {steps.size} steps; give --rate."
+            )
         # Coarse time stamps repeat and jump by whole ticks; lost samples leave a longer gap.
         tick = float(steps[steps > 0].min())
         if steps.max() > LONGEST_GAP * max(mean_step, tick):
@@ -247,6 +259,22 @@ class TimeColumn:
                 f"among steps of typically {typical:.4g} s; give --rate, or record again."
             )
         return mean_step
+
+
+def _mean_step(values: Floats) -> float:
+    """Mean distance of samples; NaN where times change too rarely to tell.
+
+    Stamps that repeat change at whole ticks only: what lies before the first and behind the last
+    change is no whole tick.
+    """
+    steps = np.diff(values)
+    changes = np.flatnonzero(steps > 0)
+    if (steps != 0).all():
+        return float(steps.mean())
+    if changes.size < 2:
+        return float("nan")
+    first, last = int(changes[0]), int(changes[-1])
+    return float(values[last + 1] - values[first + 1]) / (last - first)
 
 
 def _breaks(values: Floats) -> NDArray[np.intp]:
@@ -308,6 +336,8 @@ def _astray(time_s: Floats) -> tuple[float, float]:
     same = max(1e-6 * float(steps.mean()), 4 * float(np.spacing(np.abs(time_s).max())))
     ticks = np.diff(steps)
     tick = float(ticks[ticks > same].min(initial=steps[-1]))
+    if 2 * np.count_nonzero(steps <= same) > steps.size:  # mostly repeats: each step is a tick
+        tick = float(steps[-1])
     most = float(np.abs(off).max())
     if most <= tick:
         return 0.0, 0.0

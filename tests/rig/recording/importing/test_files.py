@@ -152,7 +152,7 @@ def test_refused_layouts(
 @pytest.mark.parametrize(
     ("text", "expected", "got"),
     [
-        ("", "header", "0 lines"),
+        ("", "header", "empty"),
         ("time,x\n", "header", "1 line"),
         ("time,x\n0,1\n0.1,2\n0.2", ["2 values", "line 4"], 1),
         ("time,x\n0,1\n0.1,2\n0.2,", ["'x'", "line 4"], "nothing"),

@@ -32,7 +32,7 @@ from tactileq.rig.recording.importing.headers import (
         ("z_mG", ("z", "mg")),
         ("CH1 [Volts]", ("ch1", "V")),
         ("gX", ("gx", "")),
-        ("g", ("g", "")),
+        ("g", ("g", "g")),
         ("Acc X [Furlong]", ("acc_x", "furlong")),
         ("Kanal_1", ("kanal_1", "")),
         ("Time (sec)", ("time", "s")),

@@ -22,10 +22,14 @@ TIME_S = (np.arange(Z.size) / RATE_HZ).round(4)
 def log(head: str, row: str, *, tail: str = "", line_end: str = "\n") -> str:
     """A log whose rows hold {t} seconds, {ms} milliseconds, {n} from 0 and {z} g."""
     rows = (
-        row.format(t=f"{t:.4f}", ms=f"{1e3 * t:.1f}", n=n, z=f"{z:.5f}", mg=f"{1e3 * z:.2f}")
+        row.format(t=f"{t:.4f}", ms=f"{1e3 * t:.1f}", n=n, z=f"{z:.5f}", **others(z))
         for n, (t, z) in enumerate(zip(TIME_S.tolist(), Z.tolist(), strict=True))
     )
     return (head + "".join(f"{line}\n" for line in rows) + tail).replace("\n", line_end)
+
+
+def others(z: float) -> dict[str, str]:
+    return {"mg": f"{1e3 * z:.2f}", "si": f"{9.80665 * z:.5f}"}
 
 
 LOGS = {
@@ -63,6 +67,25 @@ LOGS = {
     "quotes everywhere": (log('"time_s","z_g"\n', '"{t}","{z}"'), "", {}),
     "old Macs": (log("time_s,z_g\n", "{t},{z}", line_end="\r"), "", {}),
     "Windows": (log("time_s;z_g\n", "{t};{z}", line_end="\r\n"), "", {}),
+    "units, one of them unknown": (
+        log("Time,Acc,Temp\ns,g,°C\n", "{t},{z},21.5"),
+        "time=Time,z=Acc",
+        {},
+    ),
+    "a unit with brackets": (log("T,A\nms,m/(s^2)\n", "{ms},{si}"), "time=T,z=A", {}),
+    "three lines of names": (log("t,A_Z\nCAL,CAL\nms,g\n", "{ms},{z}"), "time=t,z=A_Z", {}),
+    "names in a comment": (log("# time_s,z_g\n", "{t},{z}"), "", {}),
+    "comments": (log("#Device: a\n#Rate: 2 kHz\ntime_s,z_g\n", "{t},{z}"), "", {}),
+    "a start, no names": (log("started\n", "{t},{z}"), "time=#1,z=#2", {"unit": "g"}),
+    "the rest of a row": (log("7,0.95\ntime_s,z_g\n", "{t},{z}"), "", {}),
+    "names with blanks": (
+        log("  Time [s]   Acc Z [g]\n", "  {t}  {z}"),
+        "time=#1,z=#2",
+        {"unit": "g"},
+    ),
+    "filled with nothing": (log("time_s,z_g\n", "{t},{z}", tail="\0" * 99), "", {}),
+    "a mark twice": (log("\ufeff\ufefftime_s,z_g\n", "{t},{z}"), "time=time_s,z=z_g", {}),
+    "only a unit": (log("time_s,g\n", "{t},{z}"), "", {}),
     "blanks": (log("  time_s     z_g\n", "  {t}   {z}"), "", {}),
 }
 
@@ -137,3 +160,54 @@ def test_a_header_in_the_middle_is_a_new_start(tmp_path: Path) -> None:
     found = import_csv_file(tmp_path / "a.csv", LABEL)
     np.testing.assert_allclose(found.recording.samples, Z[:300], atol=1e-5)
     assert any("header" in told and "line 302" in told for told in found.warnings)
+
+
+REFUSED = {
+    "unit of the file": ("time,A,B\ns,m/s²,-\n", "{t},{z},1", {"unit": "g", "axis": None}, "'g'"),
+    "gyroscope": ("time_s,Gyroscope z\n", "{t},{z}", {"unit": "g"}, "'Gyroscope z'"),
+    "magnetometer": ("time_s,Mag_Z (G)\n", "{t},{z}", {}, "'Mag_Z (G)'"),
+    "weight": ("time_s,Weight (g)\n", "{t},{z}", {}, "'Weight (g)'"),
+    "two tables": ("time_s,z_g,,time_ms,y_g\n", "{t},{z},,{t},{z}", {"axis": "z"}, "Hz by"),
+    "no numbers": ("time_s,z\n", "{t},{z} g", {}, "none"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_no_acceleration_or_not_one_is_refused(tmp_path: Path, name: str) -> None:
+    head, row, options, got = REFUSED[name]
+    (tmp_path / "a.csv").write_text(log(head, row))
+    named = {"time": "time", "z": "A"} if name == "unit of the file" else {}
+    with refused(InputError, names="a.csv", got=got):
+        import_csv_file(tmp_path / "a.csv", LABEL, named=named, **options)
+
+
+def test_rows_are_neither_spliced_nor_mixed(tmp_path: Path) -> None:
+    head, *lines = log("time_s,z_g\n", "{t},{z}").splitlines()
+    marked = [f"#{line}" if 150 < n < 160 else line for n, line in enumerate(lines)]
+    restarted = [*lines[:300], "Boot", head, *lines[:50]]
+    late = [*lines[:50], "Boot", head, *lines[:300]]
+    for rows, place in ((marked, "line 153"), (restarted, "line 304"), (late, "line 52")):
+        (tmp_path / "a.csv").write_text("\n".join((head, *rows, "")))
+        with pytest.raises(InputError, match=rf"a\.csv.*{place}|{place} of .*a\.csv"):
+            import_csv_file(tmp_path / "a.csv", LABEL)
+    long = [f"{line.replace(',', f',{kind},')}" for line in lines for kind in ("acc", "gyro")]
+    (tmp_path / "a.csv").write_text("\n".join(("time_s,sensor,z_g", *long, "")))
+    with refused(InputError, expected="channel", got=["acc, gyro", "'sensor'"]):
+        import_csv_file(tmp_path / "a.csv", LABEL)
+
+
+def test_one_column_with_decimal_commas(tmp_path: Path) -> None:
+    text = log("z_g\n", "{z}").replace(".", ",")
+    (tmp_path / "a.csv").write_text(text)
+    found = import_csv_file(tmp_path / "a.csv", LABEL, rate_hz=RATE_HZ)
+    np.testing.assert_allclose(found.recording.samples, Z, atol=1e-5)
+
+
+def test_the_finer_of_two_clocks_is_taken(tmp_path: Path) -> None:
+    rows = (
+        f"{t:.2f},{1e3 * t:.1f},{z:.5f}" for t, z in zip(TIME_S.tolist(), Z.tolist(), strict=True)
+    )
+    (tmp_path / "a.csv").write_text("\n".join(("time_s,elapsed_ms,z_g", *rows, "")))
+    found = import_csv_file(tmp_path / "a.csv", LABEL, axis="z")
+    assert found.recording.rate_hz == pytest.approx(RATE_HZ)
+    assert found.recording.samples.size == Z.size

@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from tactileq.modeling import InputError
 from tactileq.rig.recording.importing.times import TimeColumn, unwrapped
-from tests.refusals import check_refusal
+from tests.refusals import check_refusal, refused
 
 Times = NDArray[np.float64]
 RATE_HZ = 2000.0
@@ -49,7 +50,7 @@ def repeated(values: Times, count: int = 10) -> Times:
         (later(1.9985, 10), "s", (0, 3997)),
         (later(1.2, 10) + later(0.3, 3) - TIME_S, "s", (600, 2400)),
         (np.floor(later(1.2, 1) * 1000), "ms", (0, 2400)),  # two samples a tick
-        (np.floor(later(1.0, 10) + 38.4), "s", (0, 2000)),  # a clock of whole seconds
+        (np.floor((later(1.0, 10) + 38.43) * 10) / 10, "s", (0, 2000)),  # a coarse clock
         (repeated(later(1.2, 0.5)), "s", (0, 2400)),
         ((later(1.5, 3) * 1e6 + 2**32 - 7e5) % 2**32, "us", (0, 3000)),
     ],
@@ -124,3 +125,26 @@ def test_any_gap_splits_where_it_is(
 ) -> None:
     values = ticks(TIME_S + np.where(np.arange(4000) >= row, gap_s, 0.0))
     assert rows(column(values)) == ((0, row) if row >= 2000 else (row, 4000))
+
+
+@pytest.mark.parametrize("tick_s", [0.001, 0.01, 1 / 64, 0.1, 1.0])
+@pytest.mark.parametrize("phase_s", [0.0, 0.37, 0.95])
+@pytest.mark.parametrize("rounded", [9, 3])
+def test_the_rate_of_coarse_stamps_is_that_of_whole_ticks(
+    tick_s: float, phase_s: float, rounded: int
+) -> None:
+    time_s = np.arange(9000) / RATE_HZ + phase_s * tick_s
+    stamps = (np.floor(time_s / tick_s) * tick_s).round(rounded)
+    time = column(stamps)
+    # One sample at either end, and the rounding of the stamps, are all that is not known.
+    tolerance = (2 / RATE_HZ + 10.0**-rounded) / (4.5 - 2 * tick_s)
+    assert time.rate_hz() == pytest.approx(RATE_HZ, rel=tolerance)
+    assert time.contradiction(RATE_HZ) is None
+    assert time.unevenness(time.rate_hz()) is None
+
+
+def test_a_clock_that_changed_once_gives_no_rate() -> None:
+    time = column(np.floor(TIME_S[:3000]))
+    with refused(InputError, expected="change", got=["1 change", "--rate"]):
+        time.rate_hz()
+    assert time.contradiction(RATE_HZ) is None
