@@ -5,6 +5,7 @@ docs/method/tables.md#matrices
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -19,10 +20,15 @@ from tactileq.modeling.files.others.table import OtherTable
 
 FEWEST_CLASSES, MOST_CLASSES = 2, 16
 Counts = npt.NDArray[np.int64]
-# As programs head sums of rows and columns (pandas, R, SPSS, spreadsheets).
-SUMS = frozenset(
-    {"all", "total", "totals", "sum", "sums", "gesamt", "summe", "σ", "∑", "合計", "計"}
-)
+# As programs head sums of rows and columns (pandas, R, SPSS, spreadsheets), and means.
+SUMS = {
+    *("total", "totals", "sum", "sums", "gesamt", "gesamtergebnis", "insgesamt", "summe", "somme"),
+    *("totale", "合計", "計", "σ", "∑", "rowsum", "colsum", "marginal"),
+}
+MEANS = {"mean", "means", "average", "avg", "sd", "sem", "median", "mittelwert", "moyenne", "平均"}
+_OF_TRIALS = re.compile(r"n|hits?|correct|accuracy|percent|pc|.*%.*")
+ANSWERS = ("answer", "respon", "predict", "reported", "judg")
+MOST_COUNTED = 1e9
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +63,7 @@ def answer_matrix(table: OtherTable, *, labels: Labels) -> AnswerMatrix:
         For counts that are none, numbers without a class, classes that are presented but are no
         column, and sums that are not.
     """
+    _check_corner(table)
     used = [i for i, name in enumerate(table.names) if i and name]
     answered = [labels("class", table.text_of(table.names[i], table.lines[0])) for i in used]
     rows = [line for line in table.lines if any(line.cells)]
@@ -65,24 +72,38 @@ def answer_matrix(table: OtherTable, *, labels: Labels) -> AnswerMatrix:
     kept_rows, kept_columns, notes = _without_sums(counts, presented, answered, table)
     presented = [presented[i] for i in kept_rows]
     answered = [answered[i] for i in kept_columns]
+    counts = counts[np.ix_(kept_rows, kept_columns)]
     _check_square(table, presented, answered)
+    _check_others(table, counts, presented=presented, answered=answered)
     lines = [table.where(rows[i]) for i in kept_rows]
     return AnswerMatrix(
         f"{table.path}, line {table.header_line}",
         tuple(presented),
         tuple(answered),
-        counts[np.ix_(kept_rows, kept_columns)],
+        counts,
         tuple(lines),
         notes,
     )
 
 
+def _check_corner(table: OtherTable) -> None:
+    """Refuse a matrix whose corner says that its rows are answers."""
+    corner = table.names[0].casefold()
+    first = re.split(r"[\\/|,]", corner)[0]
+    if any(word in first for word in ANSWERS) and "present" not in first:
+        raise InputError(
+            f"expected classes that were presented in the first column of {table.path}, got a "
+            f"corner called {shown(table.names[0])}; transpose the matrix, or rename the corner."
+        )
+
+
 def _counts(table: OtherTable, columns: Sequence[int]) -> Counts:
     names = [f"#{i + 1}" for i in columns]
-    style = table.numbers(names)
+    style = table.numbers(names, whole=True)
     values = np.array([table.floats(name, style, what="a count") for name in names]).T
     values = np.nan_to_num(values.reshape(len(table.lines), len(columns)))
-    for row, column in np.argwhere((values < 0) | (values != np.floor(values)))[:1]:
+    wrong = (values < 0) | (values != np.floor(values)) | (values > MOST_COUNTED)
+    for row, column in np.argwhere(wrong)[:1]:
         line = table.lines[row]
         raise InputError(
             f"expected a whole count from 0 in {table.where(line)}, got "
@@ -96,7 +117,8 @@ def _without_sums(
 ) -> tuple[list[int], list[int], tuple[str, ...]]:
     """Rows and columns that are classes; those of sums, which are none, are left out.
 
-    Refused where name and counts disagree, since a class may hold the sum of the others by chance.
+    Refused where name and counts disagree, since a class may hold the sum of the others by chance;
+    a last row and column that both do are no chance.
     """
     row = _place_of_sum(counts.T)
     column = _place_of_sum(counts)
@@ -108,21 +130,28 @@ def _without_sums(
     ):
         sums = [names[place]] if place is not None else []
         for name in names:
-            is_sum = name in sums and (both or name not in others or _is_named_sum(name))
-            if is_sum != _is_named_sum(name):
+            by_name = is_named_sum(name)
+            by_counts = name in sums and (both or by_name or name not in others)
+            if by_counts != by_name and not (both and by_counts):
+                what_it_is = "sums of the others" if by_counts else "other counts than sums"
+                called = "called so" if by_name else "not called so"
                 raise InputError(
                     f"expected sums or a class in {table.path}, got the {what} {shown(name)}, "
-                    "which is the one by its name and the other by its counts; remove it or rename "
-                    "it."
+                    f"which holds {what_it_is} but is {called}; remove it or rename it."
                 )
-            if is_sum:
-                notes.append(f"The {what} {shown(name)} is no class: it holds sums.")
-        kept.append([i for i, name in enumerate(names) if not _is_named_sum(name)])
+            if by_counts:
+                notes.append(f"the {what} {shown(name)} is no class, as it holds sums")
+        left_out = sums if both or (sums and is_named_sum(sums[0])) else []
+        kept.append([i for i, name in enumerate(names) if name not in left_out])
     return kept[0], kept[1], tuple(notes)
 
 
-def _is_named_sum(name: str) -> bool:
-    return not SUMS.isdisjoint(name.casefold().split())
+def is_named_sum(name: str, *, is_level: bool = False) -> bool:
+    """Whether a name says that it sums others up; a level may be called All."""
+    words = set(re.split(r"[\W\d_]+", name.casefold())) - {""}
+    if words & MEANS and len(words) == 1:
+        return True
+    return bool(words & SUMS) or (words == {"all"} and not is_level)
 
 
 def _place_of_sum(counts: Counts) -> int | None:
@@ -148,6 +177,24 @@ def _check_square(table: OtherTable, presented: Sequence[str], answered: Sequenc
     check_classes(presented, f"{table.path}, line {table.header_line}")
 
 
+def _check_others(
+    table: OtherTable, counts: Counts, *, presented: Sequence[str], answered: Sequence[str]
+) -> None:
+    """Refuse a further column that counts hits or trials: it is no answer."""
+    places = [answered.index(name) for name in presented]
+    hits = counts[np.arange(len(presented)), places]
+    sums = counts[:, places].sum(axis=1)
+    for place, name in enumerate(answered):
+        if name in presented:
+            continue
+        own = counts[:, place]
+        if (own == hits).all() or (own >= sums).all() or _OF_TRIALS.fullmatch(name.casefold()):
+            raise InputError(
+                f"expected answers in each column of {table.path}, got {shown(name)}, which may "
+                "count hits or trials; remove the column if it is no answer."
+            )
+
+
 def check_classes(classes: Sequence[str], where: str) -> None:
     """Refuse fewer than two classes, or more than sixteen."""
     if not FEWEST_CLASSES <= len(classes) <= MOST_CLASSES:
@@ -157,14 +204,19 @@ def check_classes(classes: Sequence[str], where: str) -> None:
         )
 
 
-def expected_copies(matrices: Sequence[AnswerMatrix], place: int) -> float:
+def expected_copies(held: Sequence[Sequence[object]], place: int) -> float:
     """How many participants are expected to have answered by chance as one of them did.
 
-    By how many of the other participants have the same count in each cell, as if cells were
-    independent; all who have the same matrix are no evidence for each other.
+    By how many of the others have the same count or answer in each place, as if places were
+    independent; all who have the same everywhere are no evidence for each other.
+
+    Parameters
+    ----------
+    held : sequence of sequence
+        Counts or answers of each file, in order.
     """
-    counts = np.array([matrix.counts for matrix in matrices])
-    same = counts == counts[place]
-    others = same[~same.all(axis=(1, 2))]
-    shares = (others.sum(axis=0) + 1) / (len(others) + 2)
-    return float(len(matrices) * np.prod(shares))
+    own = held[place]
+    others = [one for one in held if len(one) == len(own) and one != own]
+    same = np.array([[a == b for a, b in zip(one, own, strict=True)] for one in others])
+    agree = same.sum(axis=0) if others else np.zeros(len(own))
+    return float(len(held) * np.prod((agree + 1) / (len(others) + 2)))

@@ -15,8 +15,9 @@ import pytest
 import soundfile
 
 from tactileq.analysis.answers.hand import load_hand
-from tactileq.analysis.answers.imported import load_imported, parse_map
+from tactileq.analysis.answers.imported import load_imported
 from tactileq.analysis.answers.loading import load_responses
+from tactileq.analysis.answers.table_map import parse_map
 from tactileq.experiments.study.study import SHIPPED_STUDY, Study
 from tactileq.experiments.tasks import plan_session
 from tactileq.modeling import (

@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 import scipy.stats
 
-from tactileq.analysis.answers.imported import parse_map
+from tactileq.analysis.answers.table_map import parse_map
 from tactileq.experiments.study.study import Study
 from tactileq.modeling import Scene
 from tactileq.stimuli.sets.recipe import Recipe

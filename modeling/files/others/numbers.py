@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -78,20 +79,27 @@ class Numbers:
         Cells by the name of their column; missing ones count for nothing.
     decimal : str
         The decimal sign, where it is known; else both are tried.
+    whole : bool
+        Whether they are counts: readings that are not whole are then none.
     """
 
-    def __init__(self, columns: Mapping[str, Iterable[str]], *, decimal: str = "") -> None:
+    def __init__(
+        self, columns: Mapping[str, Iterable[str]], *, decimal: str = "", whole: bool = False
+    ) -> None:
         self.seen = {
             name: dict.fromkeys(cell for cell in cells if cell.casefold() not in NO_NUMBER)
             for name, cells in columns.items()
         }
         self.decimal = decimal
+        self.whole = whole
 
     @cached_property
     def styles(self) -> list[Style]:
         """All that fit, the plainest first."""
         cells = [cell for column in self.seen.values() for cell in column]
-        return fitting(cells, decimal=self.decimal)
+        found = fitting(cells, decimal=self.decimal)
+        whole = [style for style in found if all(float(style.plain(c)) % 1 == 0 for c in cells)]
+        return whole if self.whole and whole else found
 
     @property
     def open_cell(self) -> tuple[str, str] | None:
@@ -155,8 +163,8 @@ def converted(cells: Sequence[str], style: Style) -> tuple[Floats, int]:
     """Numbers (n,), NaN where they are missing; and the place of the first that is none, or −1."""
     pattern, out = style.pattern, np.full(len(cells), np.nan)
     for place, cell in enumerate(cells):
-        if pattern.fullmatch(cell):
-            out[place] = float(style.plain(cell))
+        if pattern.fullmatch(cell) and isfinite(value := float(style.plain(cell))):
+            out[place] = value
         elif cell.casefold() not in NO_NUMBER:
             return out, place
     return out, -1

@@ -77,7 +77,7 @@ def read_other_text(path: Path, what: str) -> Text:
     data = read_bytes(path, what)
     marked = data.startswith((b"\xff\xfe", b"\xfe\xff"))
     if not marked:
-        data = data.rstrip(b"\0")  # which loggers fill a file with beforehand
+        data = data.rstrip(b"\0\x1a")  # which loggers fill a file with beforehand
     for encoding in ("utf-16",) if marked else ("utf-8-sig", "cp1252"):
         try:
             text = data.decode(encoding)

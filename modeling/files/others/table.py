@@ -41,7 +41,9 @@ _MOST_PLACES = 3  # lines that a note names
 _MOST_ABOVE = 3  # lines of names between the rest of a row and the first row
 _SAMPLED = 200  # lines of numbers by which columns of numbers are found
 _BRACKETED = re.compile(r"[\[(](.*)[\])]")
-_IMPORT_ID = '{"importid"'  # Qualtrics' third line; its second one holds the questions' texts
+_IMPORT_ID = re.compile(
+    r"\{\s*['\"]importid"
+)  # Qualtrics' third line; its second one holds the questions' texts
 
 
 def same_name(name: str) -> str:
@@ -71,7 +73,7 @@ class OtherTable:
     decimal : str
         The decimal sign, where the user states it.
     decided : tuple of str
-        What was decided where another reading is possible, a sentence each.
+        What was decided where another reading is possible.
     """
 
     path: Path
@@ -113,9 +115,16 @@ class OtherTable:
             there = shortened(", ".join(filter(None, self.names)), longest=MOST_NAMES)
             raise InputError(
                 f"expected one column {shown(name)} in {self.path}, line {self.header_line}, got "
-                f"{what}; there are {there or 'none'}; correct --map."
+                f"{what}; there are {there or 'none'}; {self._advice(same)}."
             )
         return same[0]
+
+    def _advice(self, same: Sequence[int]) -> str:
+        """What to do about a column that is not there, or several times."""
+        if same:
+            return f"name it by its number, as #{same[0] + 1}"
+        guessed = not self.text.is_certain and not "".join(self.names).isascii()
+        return "save the file as UTF-8" if guessed else "correct --map"
 
     def cells(self, name: str) -> list[str]:
         """Cells of a column, from top to bottom."""
@@ -144,8 +153,8 @@ class OtherTable:
                 "with a separator too many; name all columns in the first line."
             )
 
-    def numbers(self, columns: Sequence[str]) -> Style:
-        """How the numbers of some columns are written.
+    def numbers(self, columns: Sequence[str], *, whole: bool = False) -> Style:
+        """How the numbers of some columns are written; `whole`: they are counts.
 
         Raises
         ------
@@ -158,7 +167,7 @@ class OtherTable:
             for name, given in zip(own, columns, strict=True)
         ]
         cells = dict(zip(shown_as, map(self.cells, columns), strict=True))
-        seen = Numbers(cells, decimal=self.decimal)
+        seen = Numbers(cells, decimal=self.decimal, whole=whole)
         return seen.style(self.path, name_of=lambda name: self.names[self.place(name)] or name)
 
     def floats(self, name: str, style: Style, *, what: str = "a number") -> Floats:
@@ -244,17 +253,22 @@ def read_other_table(
 
     def header_in(lines: Sequence[Line]) -> int | None:
         goal = set(map(same_name, named))
+        usual = mode(len(line.cells) for line in lines) if lines and not named else 0
         for place, line in enumerate(lines):
-            if goal <= set(map(same_name, line.cells)):
+            if goal <= set(map(same_name, line.cells)) and len(line.cells) >= usual:
                 return place
         return None
 
     parsed = _parsed(text, path, header_in, comments=is_declared)
     lines, header = parsed.lines, parsed.header
-    if not named and wanted and lines and not _is_header(lines, wanted):
-        width = mode(line.width for line in lines)
-        first = Line(lines[0].number, [f"#{i}" for i in range(1, width + 1)])
-        lines, header = [first, *lines], 0
+    decided: tuple[str, ...] = ()
+    if not named and wanted and lines:
+        if _is_header(lines[header:], wanted):
+            decided = (f"line {lines[header].number} is taken as names of columns",)
+        else:
+            width = len(lines[header].cells)
+            first = Line(lines[header].number, [f"#{i}" for i in range(1, width + 1)])
+            lines = [*lines[:header], first, *lines[header:]]
     if len(lines) - header < 2 - is_declared:
         raise InputError(
             f"expected {what} with a line of names and lines below it in {path}, got "
@@ -262,9 +276,10 @@ def read_other_table(
         )
     if is_declared:
         _check_whole(lines[header + 1 :], path, least=len(lines[header].cells), exact=True)
-    table = _table(path, text, parsed.separator, lines, header=header)
+    table = _table(path, text, parsed.separator, lines, header=header, wanted=named)
     above = [line.number for line in lines[:header]]
-    return replace(table, left_out={"stand above the header": above, **table.left_out})
+    left_out = {"stand above the header": above, **table.left_out}
+    return replace(table, left_out=left_out, decided=(*table.decided, *decided))
 
 
 def _check_whole(lines: Sequence[Line], path: Path, *, least: int, exact: bool = False) -> None:
@@ -364,17 +379,21 @@ def _the_one(found: Sequence[_Parsed], refusal: InputError | None, path: Path) -
 
 
 def _table(
-    path: Path, text: Text, separator: str, lines: Sequence[Line], *, header: int
+    path: Path,
+    text: Text,
+    separator: str,
+    lines: Sequence[Line],
+    *,
+    header: int,
+    wanted: Sequence[str] = (),
 ) -> OtherTable:
     """The table below a header, its lines as wide as this; what is no row is left out."""
     names, below = lines[header].cells, list(lines[header + 1 :])
     left_out: dict[str, list[int]] = {}
-    if len(below) > 1 and any(c.casefold().startswith(_IMPORT_ID) for c in below[1].cells):
+    if len(below) > 1 and any(_IMPORT_ID.match(cell.casefold()) for cell in below[1].cells):
         left_out["explain columns (Qualtrics)"] = [line.number for line in below[:2]]
         below = below[2:]
-    again = [
-        line for line in below if _trimmed(names) in map(_trimmed, (line.cells, line.cells[1:]))
-    ]
+    again = [line for line in below if _repeats(line.cells, names, wanted, path, line.number)]
     if again:
         left_out["repeat the header"] = [line.number for line in again]
         below = [line for line in below if line not in again]
@@ -390,7 +409,7 @@ def _table(
         is_open = may_be_names and not any(line.cells[-1] for line in below)
         if may_be_names and not is_open and separator in "\t " and len(below) > 1:
             names = ["", *names]
-            decided = (f"{path.name}: the first cell of each line is taken as the name of a row.",)
+            decided = ("the first cell of each line is taken as the name of a row",)
     _check_lengths(below, names, path)
     full = [_full_line(line, len(names), path) for line in below]
     return OtherTable(
@@ -404,6 +423,31 @@ def _table(
         has_open_row_names=is_open,
         decided=decided,
     )
+
+
+def _repeats(
+    cells: Sequence[str], names: Sequence[str], wanted: Sequence[str], path: Path, number: int
+) -> bool:
+    """Whether a line has the names of the header again, those that are taken at least.
+
+    Refused where it has them in another order: what follows is another table.
+    """
+    begins = names[0] in cells[:2]  # or behind the name of a row
+    if begins and _trimmed(names) in map(_trimmed, (cells, cells[1:])):
+        return True
+    goal = set(map(same_name, wanted))
+    first = next((place for place, name in enumerate(names) if same_name(name) in goal), len(cells))
+    if first >= len(cells) or same_name(cells[first]) not in goal:
+        return False
+    if not goal <= set(map(same_name, cells)):
+        return False
+    pairs = [(same_name(a), same_name(b)) for a, b in zip(names, cells, strict=False)]
+    if any(a != b and a in goal for a, b in pairs):
+        raise InputError(
+            f"expected one table in {path}, got the names of columns again in line {number}, in "
+            "another order; cut the file into one for each."
+        )
+    return True
 
 
 def _trimmed(cells: Sequence[str]) -> list[str]:
@@ -463,7 +507,7 @@ def _full_line(line: Line, width: int, path: Path) -> Line:
     if line.width > width:
         raise InputError(
             f"expected {counted(width, 'cell')} in {path}, line {line.number}, as its header has, "
-            f"got {line.width}; put cells that hold the separator in quotes, or name all columns."
+            f"got {line.width}; name all columns, or put cells that hold the separator in quotes."
         )
     cells = [*line.cells[:width], *[""] * (width - len(line.cells))]
     return replace(line, cells=cells, given=len(line.cells))

@@ -295,7 +295,7 @@ def _warnings(table: OtherTable, *, taken: set[int], clocks: Sequence[str], only
     """What was left out, what was taken without being named, and a number that may be cut short."""
     name = table.path.name
     found = [
-        *table.decided,
+        *(f"{name}: {what}." for what in table.decided),
         *(
             f"{name}: {left_out_sentence(what, [f'line {n}' for n in numbers])}"
             for what, numbers in table.left_out.items()

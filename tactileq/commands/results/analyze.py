@@ -216,7 +216,8 @@ def analyze_tables(
     """Write the report on tables of any experiment."""
     import numpy as np
 
-    from tactileq.analysis.answers.imported import load_imported, parse_map
+    from tactileq.analysis.answers.imported import load_imported
+    from tactileq.analysis.answers.table_map import parse_map
     from tactileq.analysis.chapters.tables.section import table_sections
     from tactileq.analysis.report.report import write_report
     from tactileq.modeling.files.others.roles import is_file_of_roles

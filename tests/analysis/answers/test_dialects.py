@@ -15,7 +15,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tactileq.analysis.answers.imported import load_imported, parse_map
+from tactileq.analysis.answers.imported import load_imported
+from tactileq.analysis.answers.table_map import parse_map
 from tactileq.modeling import InputError
 
 NAMES = (

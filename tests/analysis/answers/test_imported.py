@@ -8,8 +8,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tactileq.analysis.answers.imported import ImportedAnswers, load_imported, parse_map
+from tactileq.analysis.answers.imported import ImportedAnswers, load_imported
+from tactileq.analysis.answers.table_map import parse_map
 from tactileq.modeling import InputError
+from tactileq.modeling.errors import shown
 from tests.refusals import refused
 
 
@@ -231,8 +233,10 @@ def test_sums_are_no_class(tmp_path: Path, sums: str) -> None:
         assert any(sums in note for note in found.notes)
     with refused(InputError, expected="class", got=f"'{sums}'"):
         load(tmp_path, "\n".join(whole).replace(",30", ",31"), "")
-    with refused(InputError, expected="class", got="'d'"):
-        load(tmp_path, "\n".join(whole).replace(sums, "d"), "")
+    found = load(tmp_path, "\n".join(whole).replace(sums, "d"), "")
+    assert mean_by(found) == {"all": 16 / 30}  # a row and a column of sums are no chance
+    with refused(InputError, expected="class", got=["'d'", "not called so"]):
+        load(tmp_path, "\n".join(whole[:-1]).replace(sums, "d"), "")
 
 
 def test_cells_stay_under_their_names(tmp_path: Path) -> None:
@@ -275,7 +279,7 @@ def test_what_may_be_a_thousand_is_refused_with_both_readings(
 ) -> None:
     with refused(InputError, expected="one reading", got=[*readings, "decimal=point"]):
         load(tmp_path, text, mapping)
-    levels = load(tmp_path, text, f"{mapping},decimal=point")
+    levels = load(tmp_path, text, f"{mapping},decimal={'comma' if '.' in text else 'point'}")
     assert len(levels.answers) == text.count("\n") - 1
 
 
@@ -329,7 +333,7 @@ def test_the_same_file_under_two_names(tmp_path: Path) -> None:
 def test_a_table_that_was_joined_with_itself_is_named(tmp_path: Path) -> None:
     rows = "101,a,1\n101,b,0\n102,a,0\n"
     found = load(tmp_path, "id,m,hit\n" + rows * 2, "participant=id,correct=hit,factor=m")
-    assert any("lines 5 to 7" in note and "lines 2 to 4" in note for note in found.notes)
+    assert any("2 times" in note and "lines 2 to 7" in note for note in found.notes)
 
 
 def test_files_are_sessions_of_a_participant(tmp_path: Path) -> None:
@@ -389,3 +393,90 @@ def test_columns_by_number(tmp_path: Path) -> None:
         assert found.answers["value"].tolist()[:2] == [0.5, 0.75]
     with refused(InputError, expected="#7", got="3 columns"):
         load(tmp_path, "full 1 0.5\nfull 2 0.25\n", "value=#7")
+
+
+@pytest.mark.parametrize(
+    ("text", "mapping", "got"),
+    [
+        ("f,c\n1.1,1\n1.10,0\n", "correct=c,factor=f", ["'1.1'", "'1.10'"]),
+        ("id,c\n01,1\n1,0\n", "participant=id,correct=c", ["'01'", "'1'"]),
+        ("id,s\nP1,0.5\nTotal,0.5\n", "participant=id,share=s", ["'Total'", "line 3"]),
+        ("m,s\na,0.5\nMean,0.5\n", "share=s,factor=m", ["'Mean'", "line 3"]),
+        ("p,a,n\nx,x,3\ny,x,2\nx,All,3\n", "presented=p,answered=a,count=n", ["'All'", "line 4"]),
+        ("p,a\nx,x\ny,null\n", "presented=p,answered=a", ["'null'", "or"]),
+        ("v\n1e400\n", "value=v", "'1e400'"),
+        ("a,b\nx,1\nb,a\n1,y\n", "answered=a,value=b", "another order"),
+        ("m,n\nx,1e12\n", "correct=m,count=n", "'x'"),
+    ],
+)
+def test_what_may_be_two_things_is_refused(
+    tmp_path: Path, text: str, mapping: str, got: object
+) -> None:
+    with pytest.raises(InputError) as told:
+        load(tmp_path, text, mapping)
+    for fact in [got] if isinstance(got, str) else list(got):  # type: ignore[call-overload]
+        assert fact in str(told.value)
+
+
+def test_names_that_look_the_same_are_one(tmp_path: Path) -> None:
+    text = "f,c\nvery rough,1\nvery\u00a0rough,0\nvery  rough\u200b,0\n\uff21\uff12,1\nA2,1\n"
+    found = load(tmp_path, text, "correct=c,factor=f")
+    assert mean_by(found, "f") == {"very rough": 1 / 3, "\uff21\uff12": 1.0}
+    assert any("\\xa0" in note for note in found.notes)
+    found = load(tmp_path, "f,c\n10\u00b2,1\n102,0\n", "correct=c,factor=f")
+    assert mean_by(found, "f") == {"10\u00b2": 1.0, "102": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("files", "right", "got"),
+    [
+        (("hit", "miss"), "hits", "hit, miss"),
+        (("x", ""), "x", "1 blank cell"),
+        (("1", "0", "true"), "1", "true"),
+    ],
+)
+def test_a_code_that_cannot_be_that_of_right_answers(
+    tmp_path: Path, files: tuple[str, ...], right: str, got: str
+) -> None:
+    (tmp_path / "P01.csv").write_text("id,c\n1,{}\n1,{}\n".format(*files[:2]))
+    paths = [tmp_path / "P01.csv"]
+    if files[2:]:
+        paths.append(tmp_path / "P02.csv")
+        paths[1].write_text(f"id,c\n2,{files[2]}\n2,false\n")
+    with refused(InputError, expected=shown(right), got=got):
+        load_imported(paths, parse_map("participant=id,correct=c", right=right))
+
+
+@pytest.mark.parametrize(
+    ("column", "cells"), [("hits", (7, 5, 4)), ("% correct", (70, 50, 40)), ("n", (20, 20, 20))]
+)
+def test_a_column_of_hits_is_no_answer(
+    tmp_path: Path, column: str, cells: tuple[int, int, int]
+) -> None:
+    rows = ("a,7,1,2", "b,3,5,2", "c,2,4,4")
+    lines = [f"{row},{cell}" for row, cell in zip(rows, cells, strict=True)]
+    with refused(InputError, expected="answers", got=f"'{column}'"):
+        load(tmp_path, "\n".join((f",a,b,c,{column}", *lines)), "")
+    with refused(InputError, expected="presented", got="'answered'"):
+        load(tmp_path, "\n".join(("answered,a,b,c", *rows)), "")
+    titled = load(tmp_path, "\n".join(("Confusion matrix", "", ",a,b,c", *rows)), "")
+    assert titled.answers["count"].sum() == 30
+    counted = load(tmp_path, "\n".join((",a,b", 'a,"1,200",800', "b,3,5")), "")
+    assert counted.answers["count"].tolist() == [1200, 800, 3, 5]
+
+
+def test_a_header_that_is_there_again_is_no_trial(tmp_path: Path) -> None:
+    for again in ("Id,A,Rt", "\ufeffid,a,rt", "id,a,"):
+        found = load(tmp_path, f"id,a,rt\nP1,x,3\n{again}\nP2,y,4\n", "participant=id,answered=a")
+        assert list(found.answers["participant_id"]) == ["P1", "P2"]
+        assert any("line 3" in note for note in found.notes)
+
+
+def test_copies_are_found_by_what_was_answered(tmp_path: Path) -> None:
+    rows = [f"{'ab'[i % 2]},{(i * i + 1) % 3 % 2},{i}.5" for i in range(12)]
+    (tmp_path / "P01.csv").write_text("\n".join(("m,hit,rt", *rows)))
+    changed = ["m;hit;rt;note", *(f"{row.replace(',', ';').replace('.5', ',50')};" for row in rows)]
+    (tmp_path / "P02.csv").write_text("\n".join(changed))
+    files = [tmp_path / "P01.csv", tmp_path / "P02.csv"]
+    with refused(InputError, expected="different", got=files):
+        load_imported(files, parse_map("correct=hit,factor=m"))

@@ -1,0 +1,274 @@
+"""Rows of tables of any experiment: which of them are trials, and what was answered in each.
+
+docs/method/tables.md#what-is-read
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+from tactileq.analysis.answers.matrices import is_named_sum
+from tactileq.analysis.answers.table_map import MEASURES, OF_FILES, TableMap
+from tactileq.modeling import InputError
+from tactileq.modeling.arrays import Floats
+from tactileq.modeling.errors import shown
+from tactileq.modeling.files.others.labels import Labels, is_no_name, same_label
+from tactileq.modeling.files.others.numbers import NO_NUMBER
+from tactileq.modeling.files.others.table import OtherTable, same_name
+
+RIGHT = {"true": 1.0, "false": 0.0}
+MOST_COUNTED = 1e9
+_WHOLE = re.compile(r"([0-9]+)[.,]0+")
+NO_ANSWER = frozenset({"na", "null", "."})  # what may be an answer of this name, or none
+
+Mask = npt.NDArray[np.bool_]
+
+
+@dataclass
+class Noted:
+    """What of all tables was left out or counted on the way."""
+
+    labels: Labels = field(default_factory=Labels)
+    missed: int = 0
+    left_out: dict[str, list[str]] = field(default_factory=dict)
+    codes: dict[str, Counter[str]] = field(default_factory=dict)
+    decided: dict[str, list[str]] = field(default_factory=dict)
+
+    def leave_out(self, what: str, places: Sequence[str]) -> None:
+        """Count lines that are no trials, by why."""
+        if places:
+            self.left_out.setdefault(what, []).extend(places)
+
+    def decide(self, what: str, place: str) -> None:
+        """Note what was decided, and where."""
+        self.decided.setdefault(what, []).append(place)
+
+
+def code_of(text: str) -> str:
+    """What equal codes have in common: 1.0 is 1, TRUE is true."""
+    key = same_label(text)
+    whole = _WHOLE.fullmatch(key)
+    return whole[1] if whole else key
+
+
+def trials(table: OtherTable, mapping: TableMap, noted: Noted) -> pd.DataFrame:
+    """The answered trials of a table with one row per trial, count or share.
+
+    Returns
+    -------
+    DataFrame
+        participant_id, the factors that are columns, presented and answered where known, correct or
+        value, count, from_file and line.
+
+    Raises
+    ------
+    InputError
+        Naming the line that does not hold what the map says.
+    """
+    return _Rows(table, mapping, noted).read()
+
+
+class _Rows:
+    """A table and its columns by role."""
+
+    def __init__(self, table: OtherTable, mapping: TableMap, noted: Noted) -> None:
+        self.table, self.mapping, self.noted = table, mapping, noted
+        self.factors = [
+            name
+            for name in self.mapping.factors
+            if name not in OF_FILES or same_name(name) in map(same_name, table.names)
+        ]
+
+    def read(self) -> pd.DataFrame:
+        """The trials with an answer."""
+        chosen, names = self._chosen, self._names
+        answer, no_answer = self._answer
+        count = self._count
+        levels = [role for role in names if role not in ("participant", "answered")]
+        no_level = self._missing(levels)
+        no_name = self._missing(["participant"] if "participant" in names else [])
+        no_trial = chosen & no_answer & (no_level | no_name)
+        self._refuse_first(chosen & ~no_answer & (no_level | no_name), levels)
+        missed = chosen & no_answer & ~no_trial
+        self.noted.missed += int(np.nansum(count[missed]))
+        places = [self._where(i) for i in np.flatnonzero(no_trial).tolist()]
+        self.noted.leave_out(f"have no answer{' and no level' * bool(levels)}", places)
+        self._refuse_sums(chosen & ~no_trial)
+        kept = chosen & ~no_answer & (self._whole(count, chosen & ~no_answer) > 0)
+        columns = {role: np.array(cells, dtype=object)[kept] for role, cells in names.items()}
+        own = {"participant_id": columns.pop("participant", self._own_name)}
+        rows = pd.DataFrame({**columns, **{k: v[kept] for k, v in answer.items()}})
+        rows = rows.assign(**own) if len(rows) else rows
+        if "presented" in rows:
+            rows["correct"] = (rows["presented"] == rows["answered"]).astype(float)
+        where = [self._where(i, whole=True) for i in np.flatnonzero(kept).tolist()]
+        return rows.assign(
+            count=count[kept].astype(int), from_file=str(self.table.path), line=where
+        )
+
+    @property
+    def _own_name(self) -> str:
+        named = [name for name in self.mapping.factors if name == "file"]
+        parts = self.table.path.stem.rsplit("_", 1) if named else [self.table.path.stem]
+        return self.noted.labels("participant", parts[0])
+
+    def _where(self, place: int, *, whole: bool = False) -> str:
+        line = self.table.lines[place]
+        return self.table.where(line) if whole else f"{self.table.path.name}, line {line.number}"
+
+    @cached_property
+    def _names(self) -> dict[str, list[str]]:
+        """Cells of the columns that hold names, by role or factor."""
+        roles = {r: c for r, c in self.mapping.columns.items() if r in ("participant",)}
+        roles |= {name: name for name in self.factors}
+        classes = {r: c for r, c in self.mapping.columns.items() if r in ("presented", "answered")}
+        names = {role: self.noted.labels.of(self.table, [c], role)[0] for role, c in roles.items()}
+        if classes:
+            both = self.noted.labels.of(self.table, list(classes.values()), "class")
+            names |= dict(zip(classes, both, strict=True))
+        return names
+
+    def _missing(self, roles: Iterable[str]) -> Mask:
+        none = np.zeros(len(self.table.lines), dtype=bool)
+        for role in roles:
+            none |= np.array([is_no_name(cell) for cell in self._names[role]], dtype=bool)
+        return none
+
+    @cached_property
+    def _chosen(self) -> Mask:
+        """Which rows count, by --where."""
+        chosen = np.ones(len(self.table.lines), dtype=bool)
+        for column, values in self.mapping.where.items():
+            wanted = set(map(code_of, values))
+            cells = [code_of(cell) for cell in self.table.cells(column)]
+            fits = np.array([cell in wanted for cell in cells], dtype=bool)
+            if not fits.any():
+                there = ", ".join(list(dict.fromkeys(self.table.cells(column)))[:5])
+                raise InputError(
+                    f"expected rows with {' or '.join(values)} in column {shown(column)} of "
+                    f"{self.table.path}, got {there}; correct --where."
+                )
+            chosen &= fits
+        places = [self._where(i) for i in np.flatnonzero(~chosen).tolist()]
+        self.noted.leave_out("have another value than --where names", places)
+        return chosen
+
+    @cached_property
+    def _answer(self) -> tuple[dict[str, Floats], Mask]:
+        """The measure of each row, and which rows have none."""
+        if self.mapping.answered and not any(getattr(self.mapping, m) for m in MEASURES):
+            cells = self._names["answered"]
+            self._refuse_doubtful(cells)
+            none = [is_no_name(cell) or cell.casefold() in NO_ANSWER for cell in cells]
+            return {}, np.array(none, dtype=bool)
+        role = next(role for role in MEASURES if getattr(self.mapping, role))
+        values = self._right() if role == "correct" else self._numbers(role)
+        if role == "share":
+            self._refuse_where((values < 0) | (values > 1), role, "a share from 0 to 1")
+        return {"value" if role == "value" else "correct": values}, np.isnan(values)
+
+    def _refuse_doubtful(self, cells: Sequence[str]) -> None:
+        """Refuse an answer that may be a name or mean that there is none."""
+        presented = self._names.get("presented", [""] * len(cells))
+        for place in np.flatnonzero(self._chosen).tolist():
+            cell = cells[place]
+            no_trial = bool(self.mapping.presented) and is_no_name(presented[place])
+            if cell.casefold() in NO_ANSWER and not no_trial:
+                raise InputError(
+                    f"expected an answer in {self._where(place, whole=True)}, got {shown(cell)}, "
+                    "which is an answer of this name or a trial without one; leave the cell empty, "
+                    "choose another name, or choose the rows that are trials with --where."
+                )
+
+    def _numbers(self, role: str) -> Floats:
+        """Numbers of the rows that count; those of others may be anything."""
+        column = self.mapping.columns[role]
+        measured = [r for r in ("share", "value", "count") if r in self.mapping.columns]
+        part = self._part
+        columns = [self.mapping.columns[r] for r in measured]
+        style = part.numbers(columns, whole=measured == ["count"])
+        out = np.full(len(self.table.lines), np.nan)
+        out[self._chosen] = part.floats(column, style)
+        return out
+
+    @cached_property
+    def _part(self) -> OtherTable:
+        """The table of the rows that count."""
+        lines = [line for line, own in zip(self.table.lines, self._chosen, strict=True) if own]
+        return replace(self.table, lines=lines)
+
+    def _right(self) -> Floats:
+        """1 for right, 0 for wrong, NaN where there is no answer."""
+        cells = self.table.cells(self.mapping.correct)
+        right = code_of(self.mapping.right)
+        codes = self.noted.codes.setdefault(str(self.table.path), Counter())
+        out = np.full(len(self.table.lines), np.nan)
+        for place in np.flatnonzero(self._chosen).tolist():
+            code = code_of(cells[place])
+            if code in NO_NUMBER and (not right or code != right):
+                continue
+            if right:
+                out[place] = float(code == right)
+                codes[code] += 1
+            elif code in ("0", "1"):
+                out[place] = float(code)
+            elif code in RIGHT:
+                out[place] = RIGHT[code]
+            else:
+                raise InputError(
+                    f"expected 0 or 1, or true or false, as correct in "
+                    f"{self._where(place, whole=True)}, got {shown(cells[place])}; name the code "
+                    "that is right with --right, or a column of shares as share=."
+                )
+        return out
+
+    @cached_property
+    def _count(self) -> Floats:
+        if not self.mapping.count:
+            return np.ones(len(self.table.lines))
+        return self._numbers("count")
+
+    def _whole(self, count: Floats, rows: Mask) -> Floats:
+        with np.errstate(invalid="ignore"):
+            wrong = rows & ~((count >= 0) & (count == np.floor(count)) & (count < MOST_COUNTED))
+        self._refuse_where(wrong, "count", "a whole count from 0")
+        return np.nan_to_num(count)
+
+    def _refuse_where(self, wrong: Mask, role: str, wanted: str) -> None:
+        for place in np.flatnonzero(wrong)[:1].tolist():
+            cell = self.table.cells(self.mapping.columns[role])[place]
+            advice = "divide per cent by 100" if role == "share" else "give the number of answers"
+            raise InputError(
+                f"expected {wanted} in {self._where(place, whole=True)}, got "
+                f"{shown(cell) if cell else 'none'}; {advice}."
+            )
+
+    def _refuse_sums(self, rows: Mask) -> None:
+        """Refuse rows that by their names sum others up: they would count once more."""
+        for role, cells in self._names.items():
+            for place in np.flatnonzero(rows).tolist():
+                if is_named_sum(cells[place], is_level=role in self.factors):
+                    raise InputError(
+                        f"expected a row of one {'level' if role in self.factors else role} in "
+                        f"{self._where(place, whole=True)}, got {shown(cells[place])}, which is a "
+                        "name, or sums other rows up; rename it, or remove the row."
+                    )
+
+    def _refuse_first(self, wrong: Mask, levels: Sequence[str]) -> None:
+        for place in np.flatnonzero(wrong)[:1].tolist():
+            roles = (*levels, "participant")
+            role = next(r for r in roles if r in self._names and is_no_name(self._names[r][place]))
+            raise InputError(
+                f"expected a value of {self.mapping.columns.get(role, role)} beside the answer in "
+                f"{self._where(place, whole=True)}, got {self._names[role][place] or 'none'} "
+                "(which counts as none); fill it in, or choose the rows that are trials with "
+                "--where."
+            )
