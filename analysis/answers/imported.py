@@ -287,6 +287,11 @@ def _twice_over(tables: Sequence[OtherTable]) -> list[str]:
     return found
 
 
+def _differ(rows: Sequence[Sequence[str]]) -> bool:
+    """Whether no row is there twice, as where trials are numbered."""
+    return len(set(map(tuple, rows))) == len(rows)
+
+
 def _in_order(name: str) -> tuple[bool, int, str]:
     """Numbers by size before names by letter."""
     return (False, int(name), "") if name.isdecimal() else (True, 0, name.casefold())

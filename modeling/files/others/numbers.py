@@ -48,7 +48,9 @@ class Style(NamedTuple):
         """A number of this style, as Python writes it."""
         if self.thousands:
             cell = cell.replace(self.thousands, "")
-        return cell.replace(self.decimal, ".").replace("\u2212", "-")
+        if self.decimal != ".":
+            cell = cell.replace(self.decimal, ".")
+        return cell if cell.isascii() else cell.replace("\u2212", "-")
 
     def reading(self, cell: str) -> str:
         """What a cell is by this style: `1020`."""
@@ -104,6 +106,8 @@ class Numbers:
     @property
     def open_cell(self) -> tuple[str, str] | None:
         """Column and cell of a number that has several readings, if there is one."""
+        if len(self.styles) < 2:
+            return None
         for name, cells in self.seen.items():
             for cell in cells:
                 if len({style.reading(cell) for style in self.styles}) > 1:
@@ -161,6 +165,10 @@ def fitting(cells: Sequence[str], *, decimal: str = "") -> list[Style]:
 
 def converted(cells: Sequence[str], style: Style) -> tuple[Floats, int]:
     """Numbers (n,), NaN where they are missing; and the place of the first that is none, or −1."""
+    if all(map(style.pattern.fullmatch, cells)):
+        whole = np.array([style.plain(cell) for cell in cells], dtype=np.float64)
+        if np.isfinite(whole).all():
+            return whole, -1
     pattern, out = style.pattern, np.full(len(cells), np.nan)
     for place, cell in enumerate(cells):
         if pattern.fullmatch(cell) and isfinite(value := float(style.plain(cell))):

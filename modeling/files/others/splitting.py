@@ -113,7 +113,8 @@ def split(text: Text, separator: str, path: Path, *, comments: bool = False) -> 
     """
     content = text.content
     physical = content.split("\n")
-    if '"' not in content:
+    has_quotes = '"' in content
+    if not has_quotes:
         every: Iterable[tuple[int, list[str]]] = (
             (number, _blanks(line) if separator == " " else line.split(separator))
             for number, line in enumerate(physical)
@@ -125,7 +126,7 @@ def split(text: Text, separator: str, path: Path, *, comments: bool = False) -> 
         stripped = [cell.strip() for cell in cells]
         if not any(stripped) or (comments and stripped[0].startswith("#")):
             continue
-        ends = sum(cell.count("\n") for cell in cells)
+        ends = sum(cell.count("\n") for cell in cells) if has_quotes else 0
         within = physical[number : min(number + ends + 1, last)] if ends else ()
         widths = tuple(len(line.split(separator)) for line in within)
         lines.append(Line(number + text.skipped + 1, stripped, widths))

@@ -11,7 +11,7 @@ import re
 import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import groupby, zip_longest
+from itertools import groupby, islice, zip_longest
 from pathlib import Path
 from statistics import mode
 
@@ -313,7 +313,9 @@ class _Parsed:
     @property
     def is_even(self) -> bool:
         """Whether every line fits the header, which has several cells, or one where all have."""
-        most = max((line.width for line in self.lines[self.header :]), default=0)
+        most = max((len(line.cells) for line in self.lines[self.header :]), default=0)
+        if most > self.width:
+            most = max(line.width for line in self.lines[self.header :])
         row_names = self.separator in "\t " and self._are_wider
         return most <= self.width + row_names and (self.width > 1 or most == 1)
 
@@ -345,8 +347,8 @@ def _parsed(
     separators = [text.separator] if text.separator else list(SEPARATORS)
     often = text.content.count
     for separator in sorted(separators, key=lambda one: (one == " ", -often(one))):
-        if any(one.separator not in text.content for one in found) and (
-            separator not in text.content
+        if separator not in text.content and any(
+            one.is_even or one.separator not in text.content for one in found
         ):
             continue  # a table of one column is the same by all that it does not hold
         if separator == " " and any(one.width > 1 for one in found):
@@ -435,6 +437,8 @@ def _repeats(
     begins = names[0] in cells[:2]  # or behind the name of a row
     if begins and _trimmed(names) in map(_trimmed, (cells, cells[1:])):
         return True
+    if not wanted:
+        return False
     goal = set(map(same_name, wanted))
     first = next((place for place, name in enumerate(names) if same_name(name) in goal), len(cells))
     if first >= len(cells) or same_name(cells[first]) not in goal:
@@ -504,6 +508,8 @@ def _ends_table(line: Line) -> bool:
 
 def _full_line(line: Line, width: int, path: Path) -> Line:
     """The line with as many cells as the header; spreadsheets add and drop empty ones."""
+    if len(line.cells) == width:
+        return line
     if line.width > width:
         raise InputError(
             f"expected {counted(width, 'cell')} in {path}, line {line.number}, as its header has, "
@@ -613,10 +619,13 @@ def _run_of_numbers(lines: Sequence[Line]) -> _Run | None:
     run = _Run(start, stop, most, columns)
     if not columns or (most == 1 and not fitting([line.cells[0] for line in sample[-9:]])):
         return None  # 0.5,1.25 is no number, though it looks like one
-    rows = [place for place in range(start, stop) if run.holds(lines[place])]
-    if len(rows) > 2 and rows[0] + 1 < rows[1] and rows[1] - rows[0] <= _MOST_ABOVE:
+    rows = list(islice((p for p in range(start, stop) if run.holds(lines[p])), 2))
+    if not rows:
+        return None
+    if len(rows) > 1 and 1 < rows[1] - rows[0] <= _MOST_ABOVE:
         del rows[0]  # the rest of a row that was sent before the names were
-    return replace(run, start=rows[0], stop=rows[-1] + 1) if rows else None
+    last = next(p for p in range(stop - 1, start - 1, -1) if run.holds(lines[p]))
+    return replace(run, start=rows[0], stop=last + 1)
 
 
 def _check_run(lines: Sequence[Line], run: _Run, path: Path) -> None:

@@ -226,9 +226,9 @@ def _places_of(path: Path, headers: Mapping[int, str], axis: Axis) -> list[int]:
 
 def _samples(table: OtherTable, place: int, style: Style) -> Floats:
     """A column of samples, in which no number is missing."""
-    name = table.names[place]
+    name, fits = table.names[place], style.pattern.fullmatch
     for line in table.lines:
-        if overrange(line.cells[place]) and not style.pattern.fullmatch(line.cells[place]):
+        if not fits(line.cells[place]) and overrange(line.cells[place]):
             raise InputError(
                 f"expected samples within the range of the sensor in {table.where(line)}, got "
                 f"{shown(line.cells[place])} in column {shown(name)}; record again with a wider "
