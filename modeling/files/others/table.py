@@ -275,11 +275,22 @@ def read_other_table(
             f"{counted(len(lines), 'line')}; give a file that is not empty."
         )
     if is_declared:
-        _check_whole(lines[header + 1 :], path, least=len(lines[header].cells), exact=True)
+        lines = _without_blank_ends(lines[header:])
+        header = 0
+        _check_whole(lines[1:], path, least=len(lines[0].cells), exact=True)
     table = _table(path, text, parsed.separator, lines, header=header, wanted=named)
     above = [line.number for line in lines[:header]]
     left_out = {"stand above the header": above, **table.left_out}
     return replace(table, left_out=left_out, decided=(*table.decided, *decided))
+
+
+def _without_blank_ends(lines: Sequence[Line]) -> list[Line]:
+    """Lines without blank cells beyond the last name."""
+    width = lines[0].width
+    return [
+        replace(line, cells=line.cells[:width]) if line.width <= width < len(line.cells) else line
+        for line in lines
+    ]
 
 
 def _check_whole(lines: Sequence[Line], path: Path, *, least: int, exact: bool = False) -> None:
