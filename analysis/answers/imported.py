@@ -23,12 +23,8 @@ from tactileq.analysis.answers.table_map import OF_FILES, TableMap
 from tactileq.analysis.answers.table_rows import Noted, code_of, trials
 from tactileq.modeling import InputError
 from tactileq.modeling.errors import counted, shown
-from tactileq.modeling.files.others.table import (
-    OtherTable,
-    left_out_sentence,
-    listed,
-    read_other_table,
-)
+from tactileq.modeling.files.others.named_table import read_other_table
+from tactileq.modeling.files.others.table import OtherTable, left_out_sentence, listed
 
 FEWEST_COPIES = 0.01  # expected number of equal files by chance, from which on they may be
 

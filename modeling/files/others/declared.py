@@ -7,8 +7,8 @@ from pathlib import Path
 
 from tactileq.modeling.errors import InputError
 from tactileq.modeling.files.columns import MISSING, Column, names
+from tactileq.modeling.files.others.named_table import read_other_table
 from tactileq.modeling.files.others.numbers import PLAIN
-from tactileq.modeling.files.others.table import read_other_table
 from tactileq.modeling.files.tables import Row, check_header, typed, unguarded
 
 

@@ -18,14 +18,10 @@ import numpy as np
 from tactileq.modeling import InputError
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import shortened, shown
+from tactileq.modeling.files.others.number_table import read_number_table
 from tactileq.modeling.files.others.numbers import Style
 from tactileq.modeling.files.others.roles import parse_roles
-from tactileq.modeling.files.others.table import (
-    OtherTable,
-    left_out_sentence,
-    number_of,
-    read_number_table,
-)
+from tactileq.modeling.files.others.table import OtherTable, left_out_sentence, number_of
 from tactileq.rig.recording.importing.headers import (
     TIME_NAMES,
     is_acceleration,
