@@ -14,7 +14,7 @@ from tactileq.modeling.errors import InputError, counted
 from tactileq.modeling.files.others.numbers import is_number
 from tactileq.modeling.files.others.rows import check_whole, table_below
 from tactileq.modeling.files.others.separators import Parsed, parsed_lines
-from tactileq.modeling.files.others.splitting import Line, read_other_text
+from tactileq.modeling.files.others.splitting import TableLine, read_other_text
 from tactileq.modeling.files.others.table import OtherTable, number_of, same_name
 
 
@@ -46,7 +46,7 @@ def read_other_table(
     text = read_other_text(path, what)
     named = [name for name in wanted if number_of(name) is None]
 
-    def header_in(lines: Sequence[Line]) -> int | None:
+    def header_in(lines: Sequence[TableLine]) -> int | None:
         goal = set(map(same_name, named))
         usual = mode(len(line.cells) for line in lines) if lines and not named else 0
         for place, line in enumerate(lines):
@@ -62,7 +62,7 @@ def read_other_table(
             decided = (f"line {lines[header].number} is taken as names of columns",)
         else:
             width = len(lines[header].cells)
-            first = Line(lines[header].number, [f"#{i}" for i in range(1, width + 1)])
+            first = TableLine(lines[header].number, [f"#{i}" for i in range(1, width + 1)])
             lines = [*lines[:header], first, *lines[header:]]
     if len(lines) - header < 2 - is_declared:
         raise InputError(
@@ -79,7 +79,7 @@ def read_other_table(
     return replace(table, left_out=left_out, decided=(*table.decided, *decided))
 
 
-def _without_blank_ends(lines: Sequence[Line]) -> list[Line]:
+def _without_blank_ends(lines: Sequence[TableLine]) -> list[TableLine]:
     """Lines without blank cells beyond the last name."""
     width = lines[0].width
     return [
@@ -88,7 +88,7 @@ def _without_blank_ends(lines: Sequence[Line]) -> list[Line]:
     ]
 
 
-def _is_header(lines: Sequence[Line], wanted: Sequence[str]) -> bool:
+def _is_header(lines: Sequence[TableLine], wanted: Sequence[str]) -> bool:
     """Whether the first line names columns: its cells are no numbers and do not occur again."""
     for name in wanted:
         place = int(name[1:]) - 1

@@ -16,8 +16,8 @@ import numpy as np
 from tactileq.modeling.errors import InputError, counted, shown
 from tactileq.modeling.files.others.numbers import NO_NUMBER, fitting, is_number
 from tactileq.modeling.files.others.rows import table_below
-from tactileq.modeling.files.others.separators import parsed_lines
-from tactileq.modeling.files.others.splitting import Line, read_other_text
+from tactileq.modeling.files.others.separators import Parsed, parsed_lines
+from tactileq.modeling.files.others.splitting import TableLine, read_other_text
 from tactileq.modeling.files.others.table import OtherTable, number_of, same_name
 
 _MOST_ABOVE = 3  # lines of names between the rest of a row and the first row
@@ -46,7 +46,7 @@ def read_number_table(
     """
     text = read_other_text(path, what)
 
-    def header_in(lines: Sequence[Line]) -> int | None:
+    def header_in(lines: Sequence[TableLine]) -> int | None:
         run = _run_of_numbers(lines)
         if run is None:
             return None
@@ -70,10 +70,9 @@ def read_number_table(
                 "give columns by number, as in --map time=#1,z=#2."
             )
         names = [f"#{i}" for i in range(1, run.width + 1)]
-    first = Line(header.number if header else lines[run.start].number, names)
-    table = table_below(
-        path, text, parsed.separator, [first, *lines[run.start : run.stop]], header=0
-    )
+    first = TableLine(header.number if header else lines[run.start].number, names)
+    rows = [first, *lines[run.start : run.stop]]
+    table = table_below(Parsed(parsed.separator, rows), text, path)
     before = [line for line in lines[: run.start] if not line.cells[0].startswith("#")]
     above = [line.number for line in before if line.number < first.number]
     below = [line.number for line in lines[run.stop :]]
@@ -82,7 +81,7 @@ def read_number_table(
     return replace(table, left_out={**left_out, **table.left_out}, numeric=numeric)
 
 
-def _holds_numbers(line: Line) -> bool:
+def _holds_numbers(line: TableLine) -> bool:
     """Whether most of its cells are numbers."""
     return 2 * sum(map(is_number, line.cells)) > line.width
 
@@ -96,7 +95,7 @@ class _Run:
     width: int
     columns: tuple[int, ...]
 
-    def holds(self, line: Line) -> bool:
+    def holds(self, line: TableLine) -> bool:
         """Whether the columns of numbers hold numbers in this line, or nothing."""
         if len(line.cells) != self.width:
             return False
@@ -108,7 +107,7 @@ class _Run:
         )
 
 
-def _run_of_numbers(lines: Sequence[Line]) -> _Run | None:
+def _run_of_numbers(lines: Sequence[TableLine]) -> _Run | None:
     """The longest run of lines of one width, from its first row of numbers to its last one."""
     start = stop = 0
     for width, group in groupby(enumerate(lines), key=lambda item: len(item[1].cells)):
@@ -133,7 +132,7 @@ def _run_of_numbers(lines: Sequence[Line]) -> _Run | None:
     return replace(run, start=rows[0], stop=last + 1)
 
 
-def _check_run(lines: Sequence[Line], run: _Run, path: Path) -> None:
+def _check_run(lines: Sequence[TableLine], run: _Run, path: Path) -> None:
     """Refuse numbers outside of the run: a damaged line splits what was one."""
     for line in lines[run.stop :]:
         inside = [line.cells[i] for i in run.columns if len(line.cells) == run.width]
@@ -160,7 +159,7 @@ def _check_run(lines: Sequence[Line], run: _Run, path: Path) -> None:
         raise _damaged(next(line for line in after if not run.holds(line)), run, path)
 
 
-def _damaged(line: Line, run: _Run, path: Path) -> InputError:
+def _damaged(line: TableLine, run: _Run, path: Path) -> InputError:
     got = str(len(line.cells)) if len(line.cells) != run.width else shown(line.cells[0])
     return InputError(
         f"expected {counted(run.width, 'value')} in line {line.number} of {path.name}, got {got}; "
@@ -169,8 +168,8 @@ def _damaged(line: Line, run: _Run, path: Path) -> InputError:
 
 
 def _names_above(
-    lines: Sequence[Line], run: _Run, *, wanted: Sequence[str], is_unit: Callable[[str], bool]
-) -> tuple[Line | None, list[str]]:
+    lines: Sequence[TableLine], run: _Run, *, wanted: Sequence[str], is_unit: Callable[[str], bool]
+) -> tuple[TableLine | None, list[str]]:
     """The line of names above the numbers, its names with the units below it.
 
     A line that begins with # is one of names only where there is no other.
@@ -202,7 +201,7 @@ def _bare(unit: str) -> str:
 
 
 def _units(
-    lines: Sequence[Line], fits: Sequence[Line], *, is_unit: Callable[[str], bool]
+    lines: Sequence[TableLine], fits: Sequence[TableLine], *, is_unit: Callable[[str], bool]
 ) -> list[str]:
     """The cells of a last line of units below one of names; none where there is no such line."""
     if len(lines) < 2 or lines[-1] in fits:

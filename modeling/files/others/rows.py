@@ -14,7 +14,7 @@ from pathlib import Path
 from tactileq.modeling.errors import InputError, counted, shown
 from tactileq.modeling.files.others.numbers import is_number
 from tactileq.modeling.files.others.separators import Parsed
-from tactileq.modeling.files.others.splitting import Line, Text, check_spans
+from tactileq.modeling.files.others.splitting import TableLine, Text, check_spans
 from tactileq.modeling.files.others.table import OtherTable, same_name
 
 # In Qualtrics' third line; its second one holds the questions' texts.
@@ -106,7 +106,7 @@ def _repeats(
 
 def _trimmed(cells: Sequence[str]) -> list[str]:
     """Cells up to the last one that is not blank."""
-    return list(cells[: Line(0, list(cells)).width])
+    return list(cells[: TableLine(0, list(cells)).width])
 
 
 def _may_be_row_names(cells: Sequence[str]) -> bool:
@@ -117,7 +117,7 @@ def _may_be_row_names(cells: Sequence[str]) -> bool:
     )
 
 
-def _check_lengths(lines: Sequence[Line], names: Sequence[str], path: Path) -> None:
+def _check_lengths(lines: Sequence[TableLine], names: Sequence[str], path: Path) -> None:
     """Refuse lines of other lengths, unless the program leaves out blank cells at their ends.
 
     A cell too many, even a blank one, tells a separator within a cell; one too few, a line end.
@@ -148,7 +148,7 @@ def _check_lengths(lines: Sequence[Line], names: Sequence[str], path: Path) -> N
             )
 
 
-def _ends_table(line: Line) -> bool:
+def _ends_table(line: TableLine) -> bool:
     """Whether a last line is no row: a word alone, or END OF FILE."""
     words = " ".join(filter(None, line.cells))
     alone = len(line.cells) == 1 and words.isprintable() and not set("\t;,|") & set(words)
@@ -156,7 +156,7 @@ def _ends_table(line: Line) -> bool:
     return alone or words.casefold() in ("end of file", "eof")
 
 
-def _full_line(line: Line, width: int, path: Path) -> Line:
+def _full_line(line: TableLine, width: int, path: Path) -> TableLine:
     """The line with as many cells as the header; spreadsheets add and drop empty ones."""
     if len(line.cells) == width:
         return line
@@ -169,7 +169,7 @@ def _full_line(line: Line, width: int, path: Path) -> Line:
     return replace(line, cells=cells, given=len(line.cells))
 
 
-def check_whole(lines: Sequence[Line], path: Path, *, least: int, exact: bool = False) -> None:
+def check_whole(lines: Sequence[TableLine], path: Path, *, least: int, exact: bool = False) -> None:
     for line in lines:
         if len(line.cells) < least or (exact and len(line.cells) > least):
             raise InputError(

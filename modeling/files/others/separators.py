@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tactileq.modeling.errors import InputError
-from tactileq.modeling.files.others.splitting import SEPARATORS, Line, Text, split
+from tactileq.modeling.files.others.splitting import SEPARATORS, TableLine, Text, split
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class Parsed:
     """The lines by one separator, and which of them has the names."""
 
     separator: str
-    lines: list[Line]
+    lines: list[TableLine]
     header: int = 0
     has_names: bool = False
 
@@ -51,7 +51,7 @@ class Parsed:
 
 
 def parsed_lines(
-    text: Text, path: Path, header_in: Callable[[Sequence[Line]], int | None], **options: bool
+    text: Text, path: Path, header_in: Callable[[Sequence[TableLine]], int | None], **options: bool
 ) -> Parsed:
     """The lines by the separator that fits; refused where two do."""
     found: list[Parsed] = []
@@ -72,7 +72,9 @@ def parsed_lines(
                 refusal = refusal or error
             continue
         header = header_in(lines)
-        found.append(Parsed(separator, lines, header or 0, header is not None))
+        one = Parsed(separator, lines, header or 0, header is not None)
+        if one.width > 1 or separator == "\t" or "\t" not in text.content:
+            found.append(one)  # a tab separates, if nothing else does
     return _the_one(found, refusal, path)
 
 

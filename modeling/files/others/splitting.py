@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tactileq.modeling.errors import InputError
+from tactileq.modeling.errors import InputError, shown
 from tactileq.modeling.files.reading import read_bytes
 
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "blanks"}
@@ -43,7 +43,7 @@ class Text:
 
 
 @dataclass(frozen=True)
-class Line:
+class TableLine:
     """Cells of one line without blanks around them, and where it begins, from 1.
 
     Parameters
@@ -98,7 +98,7 @@ def _with_stated_separator(text: str, *, is_certain: bool) -> Text:
     return Text(content, is_certain)
 
 
-def split(text: Text, separator: str, path: Path, *, comments: bool = False) -> list[Line]:
+def split(text: Text, separator: str, path: Path, *, comments: bool = False) -> list[TableLine]:
     """The lines that are not blank.
 
     Parameters
@@ -120,7 +120,7 @@ def split(text: Text, separator: str, path: Path, *, comments: bool = False) -> 
             for number, line in enumerate(physical)
         )
     else:
-        every = _with_quotes(content, separator, path, skipped=text.skipped)
+        every = _with_quotes(content, physical, separator, path, skipped=text.skipped)
     lines, last = [], len(physical)
     for number, cells in every:
         stripped = [cell.strip() for cell in cells]
@@ -129,7 +129,7 @@ def split(text: Text, separator: str, path: Path, *, comments: bool = False) -> 
         ends = sum(cell.count("\n") for cell in cells) if has_quotes else 0
         within = physical[number : min(number + ends + 1, last)] if ends else ()
         widths = tuple(len(line.split(separator)) for line in within)
-        lines.append(Line(number + text.skipped + 1, stripped, widths))
+        lines.append(TableLine(number + text.skipped + 1, stripped, widths))
     return lines
 
 
@@ -139,7 +139,7 @@ def _blanks(line: str) -> list[str]:
 
 
 def _with_quotes(
-    content: str, separator: str, path: Path, *, skipped: int
+    content: str, physical: Sequence[str], separator: str, path: Path, *, skipped: int
 ) -> Iterator[tuple[int, list[str]]]:
     reader = csv.reader(
         io.StringIO(content, newline=""),
@@ -157,16 +157,16 @@ def _with_quotes(
             damage = (
                 f"a cell of more than {csv.field_size_limit()} characters"
                 if "field larger" in str(error)
-                else "a quote that opens a cell and is not closed at its end"
+                else "in which a quote opens a cell and is not closed at its end"
             )
             raise InputError(
                 f"expected quotes only around whole cells in {path}, line {number + skipped + 1}, "
-                f"got {damage}; close or remove the quote."
+                f"got {shown(physical[number])}, {damage}; close or remove the quote."
             ) from None
         yield number, cells
 
 
-def check_spans(lines: Sequence[Line], width: int, path: Path) -> None:
+def check_spans(lines: Sequence[TableLine], width: int, path: Path) -> None:
     """Refuse a quoted cell over several lines with the separators of two rows or more.
 
     Without its quotes these lines could be rows: an opening quote would have swallowed them.

@@ -13,7 +13,7 @@ from pathlib import Path
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import InputError, counted, shortened, shown
 from tactileq.modeling.files.others.numbers import Numbers, Style, converted
-from tactileq.modeling.files.others.splitting import Line, Text
+from tactileq.modeling.files.others.splitting import TableLine, Text
 
 MOST_NAMES = 200  # characters of the names of columns that a refusal lists
 _MOST_PLACES = 3  # lines that a note names
@@ -32,7 +32,7 @@ class OtherTable:
     ----------
     names : tuple of str
         Of the columns, blank where the header is.
-    lines : list of Line
+    lines : list of TableLine
         Below the header, each with a cell per column.
     header_line : int
         Number of the line of names.
@@ -51,7 +51,7 @@ class OtherTable:
 
     path: Path
     names: tuple[str, ...]
-    lines: list[Line]
+    lines: list[TableLine]
     separator: str
     text: Text
     header_line: int
@@ -61,7 +61,7 @@ class OtherTable:
     decimal: str = ""
     decided: tuple[str, ...] = ()
 
-    def where(self, line: Line) -> str:
+    def where(self, line: TableLine) -> str:
         """Place of a line, for messages."""
         return f"{self.path}, line {line.number}"
 
@@ -161,7 +161,7 @@ class OtherTable:
             )
         return values
 
-    def text_of(self, cell: str, line: Line) -> str:
+    def text_of(self, cell: str, line: TableLine) -> str:
         """A cell that is taken as a name; refused where its letters are not certain."""
         if not self.text.is_certain and not cell.isascii():
             other = cell.encode("cp1252", "replace").decode("mac-roman", "replace")
