@@ -13,7 +13,7 @@ from tactileq.modeling.errors import shown
 from tactileq.modeling.files.others.roles import parse_roles
 
 ROLES = ("participant", "presented", "answered", "correct", "share", "value", "count")
-MEASURES = ("correct", "share", "value")
+MEASURE_ROLES = ("correct", "share", "value")
 # Factors of tables without such a column: which of a participant's files, by order or by name.
 OF_FILES = ("session", "file")
 # Names of columns of the tables that follow from these.
@@ -103,7 +103,7 @@ def parse_map(
 
 
 def _check_map(mapping: TableMap) -> None:
-    measures = [role for role in MEASURES if getattr(mapping, role)]
+    measures = [role for role in MEASURE_ROLES if getattr(mapping, role)]
     if len(measures) > 1:
         raise InputError(
             f"expected one measure in the map, got {' and '.join(measures)}; analyse one at a time."

@@ -16,7 +16,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from tactileq.analysis.answers.matrices import is_named_sum
-from tactileq.analysis.answers.table_map import MEASURES, OF_FILES, TableMap
+from tactileq.analysis.answers.table_map import MEASURE_ROLES, OF_FILES, TableMap
 from tactileq.modeling import InputError
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import shown
@@ -164,12 +164,12 @@ class _Rows:
     @cached_property
     def _answer(self) -> tuple[dict[str, Floats], Mask]:
         """The measure of each row, and which rows have none."""
-        if self.mapping.answered and not any(getattr(self.mapping, m) for m in MEASURES):
+        if self.mapping.answered and not any(getattr(self.mapping, m) for m in MEASURE_ROLES):
             cells = self._names["answered"]
             self._refuse_doubtful(cells)
             none = [is_no_name(cell) or cell.casefold() in NO_ANSWER for cell in cells]
             return {}, np.array(none, dtype=bool)
-        role = next(role for role in MEASURES if getattr(self.mapping, role))
+        role = next(role for role in MEASURE_ROLES if getattr(self.mapping, role))
         values = self._right() if role == "correct" else self._numbers(role)
         if role == "share":
             self._refuse_where((values < 0) | (values > 1), role, "a share from 0 to 1")

@@ -241,7 +241,7 @@ CONTENTS = {
         ["quotes", "line 2"],
         "'0,\"1'",
     ),
-    "long line": ("t.tsv", b"frequency_hz\n1\t" + b"9" * 5_000_000 + b"\n", "1 cells", 2),
+    "long line": ("t.tsv", b"frequency_hz\n1\t" + b"9" * 5_000_000 + b"\n", "1 cell", 2),
     "long name": ("labels.tsv", b"x" * 5_000_000, ["file", "speed_mm_s", "force_n"], "…"),
     "no threshold": ("t.tsv", threshold("1e300").encode(), "1e+06 g", "'1e300'"),
 }

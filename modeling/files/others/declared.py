@@ -8,7 +8,7 @@ from pathlib import Path
 from tactileq.modeling.errors import InputError
 from tactileq.modeling.files.columns import MISSING, Column, names
 from tactileq.modeling.files.others.named_table import read_other_table
-from tactileq.modeling.files.others.numbers import PLAIN
+from tactileq.modeling.files.others.numbers import PLAIN_STYLE
 from tactileq.modeling.files.tables import Row, check_header, typed, unguarded
 
 
@@ -46,14 +46,14 @@ def read_user_cells(
     numeric = [c.name for c in columns if c.limits is not None and c.name in present]
     # What has a decimal point throughout is as it is declared, whatever else it may look like.
     numbers = [cell for name in numeric for cell in table.cells(name) if cell not in MISSING]
-    is_plain = all(map(PLAIN.pattern.fullmatch, numbers))
-    style = PLAIN if is_plain else table.numbers(numeric)
+    is_plain = all(map(PLAIN_STYLE.pattern.fullmatch, numbers))
+    style = PLAIN_STYLE if is_plain else table.numbers(numeric)
     rows = []
     for line in table.lines:
         cells = dict(zip(table.names, line.cells, strict=True))
         for name in present:
             cell = cells[name]
-            is_other = name in numeric and style != PLAIN and style.pattern.fullmatch(cell)
+            is_other = name in numeric and style != PLAIN_STYLE and style.pattern.fullmatch(cell)
             cells[name] = style.plain(cell) if is_other else unguarded(table.text_of(cell, line))
         rows.append((table.where(line), cells))
     return rows

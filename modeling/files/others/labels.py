@@ -7,7 +7,7 @@ import unicodedata
 from collections.abc import Sequence
 
 from tactileq.modeling.errors import InputError, shown
-from tactileq.modeling.files.others.numbers import PLAIN, Style, fitting, is_number
+from tactileq.modeling.files.others.numbers import PLAIN_STYLE, Style, fitting, is_number
 from tactileq.modeling.files.others.table import OtherTable, listed
 
 # No name; every other word is one, such as none.
@@ -84,8 +84,8 @@ class Labels:
         """
         values: dict[tuple[str, float], str] = {}
         for kind, name in ((kind, name) for (kind, _), name in self._first.items()):
-            if PLAIN.pattern.fullmatch(name):
-                other = values.setdefault((kind, float(PLAIN.plain(name))), name)
+            if PLAIN_STYLE.pattern.fullmatch(name):
+                other = values.setdefault((kind, float(PLAIN_STYLE.plain(name))), name)
                 if other != name:
                     raise InputError(
                         f"expected one spelling of each name of {kind}, got {shown(other)} and "
@@ -110,6 +110,6 @@ def ascii_where_alike(name: str) -> str:
 
 def _plain(cell: str, style: Style | None) -> str:
     """A number with a decimal point and without thousands, 1.00 as 1; any other cell as it is."""
-    if style is None or is_no_name(cell) or style == PLAIN:
+    if style is None or is_no_name(cell) or style == PLAIN_STYLE:
         return cell
     return style.plain(cell)

@@ -63,7 +63,7 @@ class Style(NamedTuple):
         return f"{self.reading(cell)} {why}"
 
 
-PLAIN = Style(".", "")
+PLAIN_STYLE = Style(".", "")
 _ANY = re.compile(r"[+\-\u2212]?[.,]?[0-9][0-9.,'\u2019 \u00a0\u202f\u2009]*(?:[eE][+\-]?[0-9]+)?")
 
 
@@ -137,7 +137,7 @@ class Numbers:
     def _nearest(self) -> Style:
         """The style that most cells fit."""
         cells = [cell for column in self.seen.values() for cell in column]
-        candidates = [PLAIN, *_possible(cells)]
+        candidates = [PLAIN_STYLE, *_possible(cells)]
         return max(candidates, key=lambda style: sum(_fits(style, cell) for cell in cells))
 
 
@@ -158,7 +158,7 @@ def fitting(cells: Sequence[str], *, decimal: str = "") -> list[Style]:
     """The styles of writing numbers that fit all cells, none of which is missing."""
     return [
         style
-        for style in dict.fromkeys(_possible(cells) if cells else [PLAIN])
+        for style in dict.fromkeys(_possible(cells) if cells else [PLAIN_STYLE])
         if decimal in ("", style.decimal) and all(map(style.pattern.fullmatch, cells))
     ]
 
