@@ -26,6 +26,9 @@ from tests.refusals import check_refusal, refused, warned
 
 LABEL = Label("oak", 100.0, 1.0)
 CHANNEL_C = {"mv_per_g": 1.0, "named": {"z": "Channel C"}}
+# Records in these tests are short; `test_recordings_too_short_for_models_are_told` is about that.
+pytestmark = pytest.mark.filterwarnings("ignore:.*models need 0.2 s:UserWarning")
+
 RATE_HZ = 3200.0
 
 
