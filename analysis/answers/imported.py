@@ -24,7 +24,7 @@ from tactileq.analysis.answers.table_rows import Noted, code_of, trials
 from tactileq.modeling import InputError
 from tactileq.modeling.errors import counted, shown
 from tactileq.modeling.files.others.named_table import read_other_table
-from tactileq.modeling.files.others.table import OtherTable, left_out_sentence, listed
+from tactileq.modeling.files.others.table import OtherTable, first_few, left_out_sentence
 
 FEWEST_COPIES = 0.01  # expected number of equal files by chance, from which on they may be
 
@@ -76,6 +76,10 @@ def load_imported(files: Sequence[str | Path], mapping: TableMap) -> ImportedAns
         Naming file and line, where a table does not hold what the map says, or has two readings.
     """
     check_sessions(mapping)
+    places = [Path(path).resolve() for path in files]
+    for place in places:
+        if places.count(place) > 1:
+            raise InputError(f"expected each file once, got {place} again; leave one out.")
     found = _Found(mapping)
     for path in files:
         table = read_other_table(Path(path), "a table of answers", wanted=mapping.wanted)
@@ -218,8 +222,8 @@ class _Found(Noted):
             return first.presented, (*first.presented, *others)
         if not self.mapping.presented:
             return (), ()
-        presented = tuple(sorted(set(rows["presented"]), key=_in_order))
-        never = sorted(set(rows["answered"]) - set(presented), key=_in_order)
+        presented = tuple(sorted(set(rows["presented"]), key=in_order))
+        never = sorted(set(rows["answered"]) - set(presented), key=in_order)
         names = sorted({table.path.name for table in self.tables})
         check_classes((*presented, *never), ", ".join(names[:3]))
         return presented, (*presented, *never)
@@ -235,13 +239,13 @@ class _Found(Noted):
             sentences.append(f"Codes of the answers: {every}; right: {self.mapping.right}.")
         sentences.extend(self.labels.notes)
         for what, places in self.decided.items():
-            sentences.append(f"{what[0].upper()}{what[1:]} ({listed(places)}).")
+            sentences.append(f"{what[0].upper()}{what[1:]} ({first_few(places)}).")
         sentences.extend(_twice_over(self.tables))
         if self.equal:
             pairs = counted(len(self.equal), "pair")
             sentences.append(
-                f"{pairs} of files that hold the same ({listed(self.equal)}); make sure that none "
-                "is a copy."
+                f"{pairs} of files that hold the same ({first_few(self.equal)}); make sure that "
+                "none is a copy."
             )
         for word in sorted(set(rows.get("answered", ())) - set(presented)) if presented else ():
             times = int(rows.loc[rows["answered"] == word, "count"].sum())
@@ -272,7 +276,8 @@ def _twice_over(tables: Sequence[OtherTable]) -> list[str]:
             in_turn = [cells[n::times] for n in range(times)]
             is_whole = size > 1 and size * times == len(cells) and len(set(map(tuple, cells))) > 1
             if is_whole and (
-                all(one == blocks[0] for one in blocks) or all(one == in_turn[0] for one in in_turn)
+                all(one == blocks[0] for one in blocks)
+                or (all(one == in_turn[0] for one in in_turn) and _differ(in_turn[0]))
             ):
                 found.append(
                     f"{table.path.name}: all rows are there {times} times, cell by cell (lines "
@@ -288,9 +293,13 @@ def _differ(rows: Sequence[Sequence[str]]) -> bool:
     return len(set(map(tuple, rows))) == len(rows)
 
 
-def _in_order(name: str) -> tuple[bool, int, str]:
-    """Numbers by size before names by letter."""
-    return (False, int(name), "") if name.isdecimal() else (True, 0, name.casefold())
+def in_order(level: object) -> tuple[bool, float, str]:
+    """Key that sorts levels: numbers by size, before names by letter."""
+    text = str(level)
+    try:
+        return False, float(text), ""
+    except ValueError:
+        return True, 0.0, text.casefold()
 
 
 def _name_parts(path: Path, factors: tuple[str, ...]) -> list[str]:
@@ -309,19 +318,15 @@ def _by_files(rows: pd.DataFrame, mapping: TableMap, found: _Found) -> pd.DataFr
     for factor in mapping.factors:
         if factor in rows or factor not in OF_FILES:
             continue
-        pairs = rows[["participant_id", "from_file"]].drop_duplicates()
-        if factor == "session":
-            levels = (pairs.groupby("participant_id", sort=False).cumcount() + 1).astype(str)
-        else:
-            levels = pairs.apply(lambda pair: _without_name(*pair), axis=1)
-        if factor == "session":
-            several = pairs[pairs.duplicated("participant_id", keep=False)]
-            for who, own in several.groupby("participant_id", sort=False):
-                files = ", ".join(Path(file).name for file in own["from_file"])
-                found.decide(
-                    "sessions are counted in the order of the files given", f"{who}: {files}"
-                )
-        by_file = dict(zip(map(tuple, pairs.to_numpy()), levels, strict=True))
+        for who, files in found.files.items():
+            if factor == "session" and len(files) > 1:
+                names = ", ".join(Path(file).name for file in files)
+                found.decide("sessions are counted in the order of the files", f"{who}: {names}")
+        by_file = {
+            (who, file): str(number) if factor == "session" else _without_name(who, file)
+            for who, files in found.files.items()
+            for number, file in enumerate(files, 1)
+        }
         cells = zip(rows["participant_id"], rows["from_file"], strict=True)
         rows[factor] = [found.labels(factor, by_file[cell]) for cell in cells]
     return rows
@@ -330,7 +335,13 @@ def _by_files(rows: pd.DataFrame, mapping: TableMap, found: _Found) -> pd.DataFr
 def _without_name(participant: str, file: str) -> str:
     """What the name of a file says beside the participant."""
     stem = Path(file).stem
-    rest = re.sub(rf"(?<![A-Za-z0-9]){re.escape(participant)}(?![A-Za-z0-9])", "", stem, count=1)
+    rest = re.sub(
+        rf"(?<![A-Za-z0-9]){re.escape(participant)}(?![A-Za-z0-9])",
+        "",
+        stem,
+        count=1,
+        flags=re.IGNORECASE,
+    )
     return rest.strip("_- .") or stem
 
 
@@ -338,7 +349,7 @@ def _share_of_response(
     rows: pd.DataFrame, mapping: TableMap
 ) -> tuple[pd.DataFrame, str, tuple[str, ...]]:
     """The rows with 1 where the answer is the one whose share is asked for; it; a note."""
-    answers = sorted(set(rows["answered"]), key=_in_order)
+    answers = sorted(set(rows["answered"]), key=in_order)
     same = [name for name in answers if code_of(name) == code_of(mapping.right)]
     if not same and (mapping.right or len(answers) != 2):
         got = f"{shown(mapping.right)} and " if mapping.right else ""

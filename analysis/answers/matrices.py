@@ -16,6 +16,8 @@ import pandas as pd
 from tactileq.modeling import InputError
 from tactileq.modeling.errors import shown
 from tactileq.modeling.files.others.labels import Labels
+from tactileq.modeling.files.others.numbers import is_number
+from tactileq.modeling.files.others.splitting import TableLine
 from tactileq.modeling.files.others.table import OtherTable
 
 FEWEST_CLASSES, MOST_CLASSES = 2, 16
@@ -65,8 +67,14 @@ def answer_matrix(table: OtherTable, *, labels: Labels) -> AnswerMatrix:
     """
     _check_corner(table)
     used = [i for i, name in enumerate(table.names) if i and name]
-    answered = [labels("class", table.text_of(table.names[i], table.lines[0])) for i in used]
-    rows = [line for line in table.lines if any(line.cells)]
+    if not table.lines:
+        raise InputError(
+            f"expected a line for each class below the header of {table.path}, got none; give a "
+            "matrix with counts."
+        )
+    header = TableLine(table.header_line, list(table.names))
+    answered = [labels("class", table.text_of(table.names[i], header)) for i in used]
+    rows = table.lines
     presented = [labels("class", table.text_of(line.cells[0], line)) for line in rows]
     counts = _counts(table, used)
     kept_rows, kept_columns, notes = _without_sums(counts, presented, answered, table)
@@ -102,6 +110,13 @@ def _counts(table: OtherTable, columns: Sequence[int]) -> Counts:
     style = table.numbers(names, whole=True)
     values = np.array([table.floats(name, style, what="a count") for name in names]).T
     values = np.nan_to_num(values.reshape(len(table.lines), len(columns)))
+    for line in table.lines:
+        for cell in (line.cells[i] for i in columns):
+            if cell and not is_number(cell):
+                raise InputError(
+                    f"expected a count in {table.where(line)}, got {shown(cell)}; write 0, or "
+                    "leave the cell blank where it means that."
+                )
     wrong = (values < 0) | (values != np.floor(values)) | (values > MOST_COUNTED)
     for row, column in np.argwhere(wrong)[:1]:
         line = table.lines[row]
@@ -148,10 +163,9 @@ def _without_sums(
 
 def is_named_sum(name: str, *, is_level: bool = False) -> bool:
     """Whether a name says that it sums others up; a level may be called All."""
-    words = set(re.split(r"[\W\d_]+", name.casefold())) - {""}
-    if words & MEANS and len(words) == 1:
-        return True
-    return bool(words & SUMS) or (words == {"all"} and not is_level)
+    words = {*re.split(r"[\W\d_]+", name.casefold()), name.casefold()} - {""}
+    alone = name.casefold().strip(" ():.")
+    return bool(words & SUMS) or alone in MEANS or (alone == "all" and not is_level)
 
 
 def _place_of_sum(counts: Counts) -> int | None:

@@ -15,18 +15,17 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from tactileq.analysis.answers.matrices import is_named_sum
+from tactileq.analysis.answers.matrices import MOST_COUNTED, is_named_sum
 from tactileq.analysis.answers.table_map import MEASURE_ROLES, OF_FILES, TableMap
 from tactileq.modeling import InputError
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import shown
 from tactileq.modeling.files.others.labels import Labels, is_no_name, same_label
-from tactileq.modeling.files.others.numbers import NO_NUMBER
+from tactileq.modeling.files.others.numbers import NO_NUMBER, PLAIN_STYLE
 from tactileq.modeling.files.others.table import OtherTable, same_name
 
 RIGHT = {"true": 1.0, "false": 0.0}
-MOST_COUNTED = 1e9
-_WHOLE = re.compile(r"([0-9]+)[.,]0+")
+_WHOLE = re.compile(r"([0-9]+)[.,]0{1,2}")  # three zeros may be thousands
 NO_ANSWER = frozenset({"na", "null", "."})  # what may be an answer of this name, or none
 
 Mask = npt.NDArray[np.bool_]
@@ -41,6 +40,7 @@ class Noted:
     left_out: dict[str, list[str]] = field(default_factory=dict)
     codes: dict[str, Counter[str]] = field(default_factory=dict)
     decided: dict[str, list[str]] = field(default_factory=dict)
+    files: dict[str, dict[str, None]] = field(default_factory=dict)  # of each participant, in order
 
     def leave_out(self, what: str, places: Sequence[str]) -> None:
         """Count lines that are no trials, by why."""
@@ -77,36 +77,61 @@ def trials(table: OtherTable, mapping: TableMap, noted: Noted) -> pd.DataFrame:
 
 
 class _Rows:
-    """A table and its columns by role."""
+    """The rows of a table that --where lets through, and its columns by role."""
 
     def __init__(self, table: OtherTable, mapping: TableMap, noted: Noted) -> None:
-        self.table, self.mapping, self.noted = table, mapping, noted
+        self.mapping, self.noted = mapping, noted
+        self.table = self._chosen(table)
         self.factors = [
             name
-            for name in self.mapping.factors
+            for name in mapping.factors
             if name not in OF_FILES or same_name(name) in map(same_name, table.names)
         ]
 
+    def _chosen(self, table: OtherTable) -> OtherTable:
+        """The table with the rows that --where lets through."""
+        chosen = np.ones(len(table.lines), dtype=bool)
+        for column, values in self.mapping.where.items():
+            wanted = set(map(code_of, values))
+            cells = table.cells(column)
+            fits = np.array([code_of(cell) in wanted for cell in cells], dtype=bool)
+            if not fits.any():
+                there = ", ".join(list(dict.fromkeys(cells))[:5])
+                raise InputError(
+                    f"expected rows with {' or '.join(values)} in column {shown(column)} of "
+                    f"{table.path}, got {there}; correct --where."
+                )
+            chosen &= fits
+        left_out = [line.number for line, own in zip(table.lines, chosen, strict=True) if not own]
+        places = [f"{table.path.name}, line {number}" for number in left_out]
+        self.noted.leave_out("have another value than --where names", places)
+        lines = [line for line, own in zip(table.lines, chosen, strict=True) if own]
+        return replace(table, lines=lines)
+
     def read(self) -> pd.DataFrame:
         """The trials with an answer."""
-        chosen, names = self._chosen, self._names
-        answer, no_answer = self._answer
-        count = self._count
+        names = self._names
+        answer, no_answer = self._answer()
         levels = [role for role in names if role not in ("participant", "answered")]
         no_level = self._missing(levels)
         no_name = self._missing(["participant"] if "participant" in names else [])
-        no_trial = chosen & no_answer & (no_level | no_name)
-        self._refuse_first(chosen & ~no_answer & (no_level | no_name), levels)
-        missed = chosen & no_answer & ~no_trial
-        self.noted.missed += int(np.nansum(count[missed]))
+        no_trial = no_answer & (no_level | no_name)
+        self._refuse_first(~no_answer & (no_level | no_name), levels)
+        self._refuse_sums(~no_trial)
+        count = self._count(~no_trial)
+        self.noted.missed += int(count[no_answer & ~no_trial].sum())
         places = [self._where(i) for i in np.flatnonzero(no_trial).tolist()]
         self.noted.leave_out(f"have no answer{' and no level' * bool(levels)}", places)
-        self._refuse_sums(chosen & ~no_trial)
-        kept = chosen & ~no_answer & (self._whole(count, chosen & ~no_answer) > 0)
-        columns = {role: np.array(cells, dtype=object)[kept] for role, cells in names.items()}
-        own = {"participant_id": columns.pop("participant", self._own_name)}
-        rows = pd.DataFrame({**columns, **{k: v[kept] for k, v in answer.items()}})
-        rows = rows.assign(**own) if len(rows) else rows
+        who = names.pop("participant", [self._own_name] * len(self.table.lines))
+        for name, left_out in zip(who, no_trial, strict=True):
+            if not left_out:
+                self.noted.files.setdefault(name, {})[str(self.table.path)] = None
+        kept = ~no_answer & (count > 0)
+        columns = {"participant_id": who, **names, **answer}
+        rows = pd.DataFrame(
+            {role: np.array(cells, dtype=object)[kept] for role, cells in columns.items()}
+        )
+        rows = rows.astype(dict.fromkeys(answer, float))
         if "presented" in rows:
             rows["correct"] = (rows["presented"] == rows["answered"]).astype(float)
         where = [self._where(i, whole=True) for i in np.flatnonzero(kept).tolist()]
@@ -127,14 +152,14 @@ class _Rows:
     @cached_property
     def _names(self) -> dict[str, list[str]]:
         """Cells of the columns that hold names, by role or factor."""
-        roles = {r: c for r, c in self.mapping.columns.items() if r in ("participant",)}
-        roles |= {name: name for name in self.factors}
-        classes = {r: c for r, c in self.mapping.columns.items() if r in ("presented", "answered")}
-        names = {role: self.noted.labels.of(self.table, [c], role)[0] for role, c in roles.items()}
-        if classes:
-            both = self.noted.labels.of(self.table, list(classes.values()), "class")
-            names |= dict(zip(classes, both, strict=True))
-        return names
+        of, mapping = self.noted.labels.of, self.mapping
+        names: dict[str, list[str]] = {}
+        if mapping.participant:
+            names["participant"] = of(self.table, [mapping.participant], "participant")[0]
+        names |= {name: of(self.table, [name], name)[0] for name in self.factors}
+        classes = {r: c for r, c in mapping.columns.items() if r in ("presented", "answered")}
+        both = of(self.table, list(classes.values()), "class") if classes else []
+        return names | dict(zip(classes, both, strict=True))
 
     def _missing(self, roles: Iterable[str]) -> Mask:
         none = np.zeros(len(self.table.lines), dtype=bool)
@@ -142,34 +167,14 @@ class _Rows:
             none |= np.array([is_no_name(cell) for cell in self._names[role]], dtype=bool)
         return none
 
-    @cached_property
-    def _chosen(self) -> Mask:
-        """Which rows count, by --where."""
-        chosen = np.ones(len(self.table.lines), dtype=bool)
-        for column, values in self.mapping.where.items():
-            wanted = set(map(code_of, values))
-            cells = [code_of(cell) for cell in self.table.cells(column)]
-            fits = np.array([cell in wanted for cell in cells], dtype=bool)
-            if not fits.any():
-                there = ", ".join(list(dict.fromkeys(self.table.cells(column)))[:5])
-                raise InputError(
-                    f"expected rows with {' or '.join(values)} in column {shown(column)} of "
-                    f"{self.table.path}, got {there}; correct --where."
-                )
-            chosen &= fits
-        places = [self._where(i) for i in np.flatnonzero(~chosen).tolist()]
-        self.noted.leave_out("have another value than --where names", places)
-        return chosen
-
-    @cached_property
     def _answer(self) -> tuple[dict[str, Floats], Mask]:
         """The measure of each row, and which rows have none."""
-        if self.mapping.answered and not any(getattr(self.mapping, m) for m in MEASURE_ROLES):
+        role = next((role for role in MEASURE_ROLES if getattr(self.mapping, role)), "")
+        if not role:
             cells = self._names["answered"]
             self._refuse_doubtful(cells)
             none = [is_no_name(cell) or cell.casefold() in NO_ANSWER for cell in cells]
             return {}, np.array(none, dtype=bool)
-        role = next(role for role in MEASURE_ROLES if getattr(self.mapping, role))
         values = self._right() if role == "correct" else self._numbers(role)
         if role == "share":
             self._refuse_where((values < 0) | (values > 1), role, "a share from 0 to 1")
@@ -178,8 +183,7 @@ class _Rows:
     def _refuse_doubtful(self, cells: Sequence[str]) -> None:
         """Refuse an answer that may be a name or mean that there is none."""
         presented = self._names.get("presented", [""] * len(cells))
-        for place in np.flatnonzero(self._chosen).tolist():
-            cell = cells[place]
+        for place, cell in enumerate(cells):
             no_trial = bool(self.mapping.presented) and is_no_name(presented[place])
             if cell.casefold() in NO_ANSWER and not no_trial:
                 raise InputError(
@@ -189,21 +193,10 @@ class _Rows:
                 )
 
     def _numbers(self, role: str) -> Floats:
-        """Numbers of the rows that count; those of others may be anything."""
-        column = self.mapping.columns[role]
         measured = [r for r in ("share", "value", "count") if r in self.mapping.columns]
-        part = self._part
         columns = [self.mapping.columns[r] for r in measured]
-        style = part.numbers(columns, whole=measured == ["count"])
-        out = np.full(len(self.table.lines), np.nan)
-        out[self._chosen] = part.floats(column, style)
-        return out
-
-    @cached_property
-    def _part(self) -> OtherTable:
-        """The table of the rows that count."""
-        lines = [line for line, own in zip(self.table.lines, self._chosen, strict=True) if own]
-        return replace(self.table, lines=lines)
+        style = self.table.numbers(columns, whole=measured == ["count"])
+        return self.table.floats(self.mapping.columns[role], style)
 
     def _right(self) -> Floats:
         """1 for right, 0 for wrong, NaN where there is no answer."""
@@ -211,36 +204,34 @@ class _Rows:
         right = code_of(self.mapping.right)
         codes = self.noted.codes.setdefault(str(self.table.path), Counter())
         out = np.full(len(self.table.lines), np.nan)
-        for place in np.flatnonzero(self._chosen).tolist():
-            code = code_of(cells[place])
+        for place, cell in enumerate(cells):
+            code = code_of(cell)
             if code in NO_NUMBER and (not right or code != right):
                 continue
             if right:
                 out[place] = float(code == right)
                 codes[code] += 1
-            elif code in ("0", "1"):
-                out[place] = float(code)
+            elif PLAIN_STYLE.pattern.fullmatch(cell) and float(cell) in (0.0, 1.0):
+                out[place] = float(cell)
             elif code in RIGHT:
                 out[place] = RIGHT[code]
             else:
                 raise InputError(
                     f"expected 0 or 1, or true or false, as correct in "
-                    f"{self._where(place, whole=True)}, got {shown(cells[place])}; name the code "
+                    f"{self._where(place, whole=True)}, got {shown(cell)}; name the code "
                     "that is right with --right, or a column of shares as share=."
                 )
         return out
 
-    @cached_property
-    def _count(self) -> Floats:
+    def _count(self, rows: Mask) -> Floats:
+        """How many trials each row stands for; 0 for those that are none."""
         if not self.mapping.count:
-            return np.ones(len(self.table.lines))
-        return self._numbers("count")
-
-    def _whole(self, count: Floats, rows: Mask) -> Floats:
+            return rows.astype(float)
+        count = self._numbers("count")
         with np.errstate(invalid="ignore"):
-            wrong = rows & ~((count >= 0) & (count == np.floor(count)) & (count < MOST_COUNTED))
-        self._refuse_where(wrong, "count", "a whole count from 0")
-        return np.nan_to_num(count)
+            wrong = ~((count >= 0) & (count == np.floor(count)) & (count <= MOST_COUNTED))
+        self._refuse_where(rows & wrong, "count", "a whole count from 0")
+        return np.where(rows, count, 0)
 
     def _refuse_where(self, wrong: Mask, role: str, wanted: str) -> None:
         for place in np.flatnonzero(wrong)[:1].tolist():

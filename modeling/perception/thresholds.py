@@ -20,7 +20,7 @@ from tactileq.modeling.files.columns import ABOVE_0, Column, chosen
 from tactileq.modeling.files.described import FileSection, key
 from tactileq.modeling.files.hashes import sha256_of_values
 from tactileq.modeling.files.others.declared import read_user_cells
-from tactileq.modeling.files.reading import read_text
+from tactileq.modeling.files.others.splitting import read_other_text
 from tactileq.modeling.files.tables import typed
 from tactileq.modeling.reprs import one_line
 
@@ -213,7 +213,8 @@ def _what_is_wrong(frequency_hz: Floats, acceleration_g: Floats) -> str:
 
 def _notes(path: Path) -> dict[str, str]:
     notes = {}
-    for line in read_text(path, "a table").splitlines():
+    for written in read_other_text(path, "a table").content.splitlines():
+        line = written.strip('"').replace('""', '"')  # as spreadsheets write a cell with quotes
         if line.startswith("#") and ":" in line:
             key, value = line[1:].split(":", 1)
             notes[key.strip().lower()] = value.strip()

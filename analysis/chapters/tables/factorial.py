@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 from scipy import linalg, stats
 
+from tactileq.analysis.answers.imported import in_order
 from tactileq.analysis.columns import P
 from tactileq.analysis.statistics.paired import (
     CONFIDENCE,
@@ -145,7 +146,8 @@ def cell_means(cells: pd.DataFrame, factors: Sequence[str]) -> pd.DataFrame:
         The factors, condition, n, mean, ci_low, ci_high; levels in order.
     """
     rows = []
-    for condition, cell in cells.groupby("condition", sort=False):
+    for _, cell in cells.groupby(list(factors) or ["condition"], sort=False):
+        condition = cell["condition"].iloc[0]
         values = cell["mean"].to_numpy(dtype=float)
         low, high = interval_of(values)
         row: dict[str, object] = {factor: cell[factor].iloc[0] for factor in factors}
@@ -327,15 +329,6 @@ def overall_mean(cells: pd.DataFrame) -> tuple[float, float, float]:
     """
     people = cells.groupby("participant_id")["mean"].mean().to_numpy(dtype=float)
     return float(people.mean()), *interval_of(people)
-
-
-def in_order(level: object) -> tuple[bool, float, str]:
-    """Key that sorts levels: numbers by size, before names by letter."""
-    text = str(level)
-    try:
-        return False, float(text), ""
-    except ValueError:
-        return True, 0.0, text.casefold()
 
 
 def _condition(levels: Sequence[str]) -> str:

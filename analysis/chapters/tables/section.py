@@ -10,7 +10,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from scipy import stats
 
-from tactileq.analysis.answers.imported import ImportedAnswers
+from tactileq.analysis.answers.imported import ImportedAnswers, in_order
 from tactileq.analysis.chapters.tables.chance import CHANCE_COLUMNS, against_chance
 from tactileq.analysis.chapters.tables.factorial import (
     ANOVA_COLUMNS,
@@ -20,7 +20,6 @@ from tactileq.analysis.chapters.tables.factorial import (
     PARTICIPANT_CELL_COLUMNS,
     cell_means,
     complete_cells,
-    in_order,
     overall_mean,
     pairwise_tests,
     participant_cells,

@@ -47,7 +47,11 @@ def read_user_cells(
     # What has a decimal point throughout is as it is declared, whatever else it may look like.
     numbers = [cell for name in numeric for cell in table.cells(name) if cell not in MISSING]
     is_plain = all(map(PLAIN_STYLE.pattern.fullmatch, numbers))
-    style = PLAIN_STYLE if is_plain else table.numbers(numeric)
+    style = (
+        PLAIN_STYLE
+        if is_plain
+        else table.numbers(numeric, advice="write a decimal point, and no thousands")
+    )
     rows = []
     for line in table.lines:
         cells = dict(zip(table.names, line.cells, strict=True))

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from tactileq.modeling.errors import InputError, shown
 from tactileq.modeling.files.others.numbers import PLAIN_STYLE, Style, fitting, is_number
-from tactileq.modeling.files.others.table import OtherTable, listed
+from tactileq.modeling.files.others.table import OtherTable, first_few
 
 # No name; every other word is one, such as none.
 NO_NAME = frozenset({"", "nan", "n/a"})
@@ -84,8 +84,9 @@ class Labels:
         """
         values: dict[tuple[str, float], str] = {}
         for kind, name in ((kind, name) for (kind, _), name in self._first.items()):
-            if PLAIN_STYLE.pattern.fullmatch(name):
-                other = values.setdefault((kind, float(PLAIN_STYLE.plain(name))), name)
+            number = name.replace(",", ".")  # where words beside it left its sign as it is
+            if PLAIN_STYLE.pattern.fullmatch(number):
+                other = values.setdefault((kind, float(PLAIN_STYLE.plain(number))), name)
                 if other != name:
                     raise InputError(
                         f"expected one spelling of each name of {kind}, got {shown(other)} and "
@@ -100,7 +101,7 @@ class Labels:
             " = ".join(map(ascii_where_alike, (first, *sorted(others))))
             for first, others in self._others.items()
         ]
-        return [f"Taken as one name each: {listed(same)}."] if same else []
+        return [f"Taken as one name each: {first_few(same)}."] if same else []
 
 
 def ascii_where_alike(name: str) -> str:

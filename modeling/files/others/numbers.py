@@ -114,7 +114,7 @@ class Numbers:
                     return name, cell
         return None
 
-    def style(self, path: object, *, name_of: Callable[[str], str] = str) -> Style:
+    def style(self, path: object, *, name_of: Callable[[str], str], advice: str) -> Style:
         """The one way that fits; the plainest where none does, since a cell is then refused.
 
         Raises
@@ -128,8 +128,7 @@ class Numbers:
             readings = " or ".join(style.describe(cell) for style in by_reading.values())
             raise InputError(
                 f"expected one reading of the numbers in column {shown(name_of(name))} of "
-                f"{path}, got {shown(cell)}, which is {readings}; add decimal=point or "
-                "decimal=comma to --map."
+                f"{path}, got {shown(cell)}, which is {readings}; {advice}."
             )
         return self.styles[0] if self.styles else self._nearest
 

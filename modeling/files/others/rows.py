@@ -45,7 +45,8 @@ def table_below(
     again = [line for line in below if _repeats(line.cells, names, wanted, path, line.number)]
     if again:
         left_out["repeat the header"] = [line.number for line in again]
-        below = [line for line in below if line not in again]
+        numbers = set(left_out["repeat the header"])
+        below = [line for line in below if line.number not in numbers]
     if len(names) > 1 and len(below) > 1 and _ends_table(below[-1]):
         left_out["end the table"] = [below.pop().number]
     if separator == " ":  # among blanks, no cell can be seen to be missing
@@ -170,6 +171,7 @@ def _full_line(line: TableLine, width: int, path: Path) -> TableLine:
 
 
 def check_whole(lines: Sequence[TableLine], path: Path, *, least: int, exact: bool = False) -> None:
+    """Refuse lines with fewer cells, or with another number of them."""
     for line in lines:
         if len(line.cells) < least or (exact and len(line.cells) > least):
             raise InputError(

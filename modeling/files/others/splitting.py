@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -91,10 +92,11 @@ def read_other_text(path: Path, what: str) -> Text:
 def _with_stated_separator(text: str, *, is_certain: bool) -> Text:
     content = text.replace("\r\n", "\n").replace("\r", "\n")
     first, _, rest = content.partition("\n")
-    if first.strip('" ').removesuffix("\t").casefold() == "sep=" or (
+    first = first.strip('"')
+    if first.strip().casefold() == "sep=" or (
         first.casefold().startswith("sep=") and first[4:5] in SEPARATORS
     ):
-        return Text(rest, is_certain, first.strip('"')[4:5] or "\t", skipped=1)
+        return Text(rest, is_certain, first[4:5] or "\t", skipped=1)
     return Text(content, is_certain)
 
 
@@ -112,6 +114,8 @@ def split(text: Text, separator: str, path: Path, *, comments: bool = False) -> 
         For a quote that is not closed, or that closes within a cell, naming the line that it is in.
     """
     content = text.content
+    if comments:  # a quote in one of them opens no cell
+        content = re.sub(r"^[ \t\"]*#.*$", "", content, flags=re.MULTILINE)
     physical = content.split("\n")
     has_quotes = '"' in content
     if not has_quotes:
@@ -124,7 +128,7 @@ def split(text: Text, separator: str, path: Path, *, comments: bool = False) -> 
     lines, last = [], len(physical)
     for number, cells in every:
         stripped = [cell.strip() for cell in cells]
-        if not any(stripped) or (comments and stripped[0].startswith("#")):
+        if not any(stripped):
             continue
         ends = sum(cell.count("\n") for cell in cells) if has_quotes else 0
         within = physical[number : min(number + ends + 1, last)] if ends else ()

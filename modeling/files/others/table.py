@@ -15,6 +15,7 @@ from tactileq.modeling.errors import InputError, counted, shortened, shown
 from tactileq.modeling.files.others.numbers import Numbers, Style, converted
 from tactileq.modeling.files.others.splitting import TableLine, Text
 
+DECIMAL_ADVICE = "add decimal=point or decimal=comma to --map"
 MOST_NAMES = 200  # characters of the names of columns that a refusal lists
 _MOST_PLACES = 3  # lines that a note names
 
@@ -97,7 +98,7 @@ class OtherTable:
         if same:
             return f"name it by its number, as #{same[0] + 1}"
         guessed = not self.text.is_certain and not "".join(self.names).isascii()
-        return "save the file as UTF-8" if guessed else "correct --map"
+        return "save the file as UTF-8" if guessed else "correct --map or --where"
 
     def cells(self, name: str) -> list[str]:
         """Cells of a column, from top to bottom."""
@@ -126,7 +127,9 @@ class OtherTable:
                 "with a separator too many; name all columns in the first line."
             )
 
-    def numbers(self, columns: Sequence[str], *, whole: bool = False) -> Style:
+    def numbers(
+        self, columns: Sequence[str], *, whole: bool = False, advice: str = DECIMAL_ADVICE
+    ) -> Style:
         """How the numbers of some columns are written; `whole`: they are counts.
 
         Raises
@@ -141,7 +144,11 @@ class OtherTable:
         ]
         cells = dict(zip(shown_as, map(self.cells, columns), strict=True))
         seen = Numbers(cells, decimal=self.decimal, whole=whole)
-        return seen.style(self.path, name_of=lambda name: self.names[self.place(name)] or name)
+        return seen.style(
+            self.path,
+            name_of=lambda name: self.names[self.place(name)] or name,
+            advice=advice,
+        )
 
     def floats(self, name: str, style: Style, *, what: str = "a number") -> Floats:
         """The numbers of a column (n,), NaN where they are missing.
@@ -175,13 +182,13 @@ class OtherTable:
 def left_out_sentence(what: str, places: Sequence[str]) -> str:
     """That lines were left out, and why: `2 lines were left out: they repeat the header (…).`"""
     if len(places) != 1:
-        return f"{len(places)} lines were left out: they {what} ({listed(places)})."
+        return f"{len(places)} lines were left out: they {what} ({first_few(places)})."
     verb, _, rest = what.partition(" ")
     verb = "has" if verb == "have" else f"{verb}s"
     return f"1 line was left out: it {verb} {rest} ({places[0]})."
 
 
-def listed(places: Sequence[str]) -> str:
+def first_few(places: Sequence[str]) -> str:
     """The first few of some places, and how many more there are."""
     more = f" and {len(places) - _MOST_PLACES} more" if len(places) > _MOST_PLACES else ""
     return "; ".join(places[:_MOST_PLACES]) + more

@@ -155,7 +155,15 @@ def _is_unit(cell: str) -> bool:
 
 def _headers(table: OtherTable, named: Mapping[str, str]) -> dict[int, str]:
     """Header of each column with the role that it is given; without those that these replace."""
-    places = {_place(table, wanted): name for name, wanted in named.items()}
+    places: dict[int, str] = {}
+    for name, wanted in named.items():
+        place = _place(table, wanted)
+        if place in places:
+            raise InputError(
+                f"expected each column once in the map, got {shown(wanted)} of {table.path.name} "
+                f"as {places[place]} and as {name}; correct --map."
+            )
+        places[place] = name
     headers: dict[int, str] = {}
     for place, header in enumerate(table.names):
         if place in places:
@@ -267,8 +275,8 @@ def _best(every: Sequence[TimeColumn]) -> TimeColumn | None:
                 f"{shown(whole[0].name)} and {other.rate_hz():.6g} Hz by {shown(other.name)}; name "
                 "the right one with --time-column."
             )
-    in_part = [time for time in every if time.without_gaps(None)[1]]
-    return next(iter((*whole, *in_part, *every)), None)
+    in_part = (time for time in every if time.without_gaps(None)[1])
+    return whole[0] if whole else next(in_part, next(iter(every), None))
 
 
 def _check_one_channel(table: OtherTable) -> None:

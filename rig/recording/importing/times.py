@@ -18,6 +18,7 @@ from tactileq.modeling.recordings.spectrum import MODEL_RATE_HZ
 
 SECONDS_PER_UNIT = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 LONGEST_GAP = 2.5
+MOST_BREAKS = 10
 # A tool's vibration needs more; a rate below this means time in another unit than supposed.
 LOWEST_RATE_HZ = 20.0
 LOWEST_RATE_WITHOUT_TIME_UNIT_HZ = 250.0
@@ -131,6 +132,12 @@ class TimeColumn:
         is_time = given_hz is not None and (part.agrees(given_hz) or (steps >= 0).all())
         if not (has_a_rate or is_time):
             return slice(0, self.values.size), ""
+        if breaks.size > MOST_BREAKS and 2 * part.values.size < self.values.size:
+            raise InputError(
+                f"expected times with at most {MOST_BREAKS} breaks in {self.file}, got "
+                f"{breaks.size}: either samples are missing, or they came in batches; record "
+                "again, or remove the column of times and give --rate if they are evenly spaced."
+            )
         rate_hz = part.rate_hz() if has_a_rate else given_hz or np.nan
         worst = int(breaks[np.argmax(np.abs(steps[breaks]))])
         lost_s = float(steps[worst] / part.steps().mean()) / rate_hz
@@ -312,7 +319,8 @@ def unwrapped(values: Floats) -> Floats:
     longest = LONGEST_GAP * float(np.median(steps[steps > 0]))
     for counter in _COUNTERS:
         began = (steps < 0) & (steps + counter >= 0) & (steps + counter <= longest)
-        values = values + counter * np.append(0, np.cumsum(began))
+        if began.any() and values.min() >= 0 and values.max() < counter:
+            return values + counter * np.append(0, np.cumsum(began))
     return values
 
 
