@@ -214,7 +214,8 @@ def _what_is_wrong(frequency_hz: Floats, acceleration_g: Floats) -> str:
 def _notes(path: Path) -> dict[str, str]:
     notes = {}
     for written in read_other_text(path, "a table").content.splitlines():
-        line = written.strip('"').replace('""', '"')  # as spreadsheets write a cell with quotes
+        is_quoted = written.startswith('"') and written.endswith('"')  # by a spreadsheet
+        line = written[1:-1].replace('""', '"') if is_quoted else written
         if line.startswith("#") and ":" in line:
             key, value = line[1:].split(":", 1)
             notes[key.strip().lower()] = value.strip()

@@ -81,6 +81,10 @@ def read_number_table(
     return replace(table, left_out={**left_out, **table.left_out}, numeric=numeric)
 
 
+def _is_word(cell: str) -> bool:
+    return cell.replace(" ", "").rstrip(":").isalpha()
+
+
 def _holds_numbers(line: TableLine) -> bool:
     """Whether most of its cells are numbers."""
     return 2 * sum(map(is_number, line.cells)) > line.width
@@ -135,6 +139,8 @@ def _run_of_numbers(lines: Sequence[TableLine]) -> _Run | None:
 def _check_run(lines: Sequence[TableLine], run: _Run, path: Path) -> None:
     """Refuse numbers outside of the run: a damaged line splits what was one."""
     for line in lines[run.stop :]:
+        if _is_word(line.cells[min(run.columns[0], len(line.cells) - 1)]):
+            continue  # Mean,0.95: what sums the rows up is none of them
         inside = [line.cells[i] for i in run.columns if len(line.cells) == run.width]
         others = [cell for cell in inside if not is_number(cell)]
         if inside and not others:

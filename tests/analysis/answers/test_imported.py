@@ -480,3 +480,46 @@ def test_copies_are_found_by_what_was_answered(tmp_path: Path) -> None:
     files = [tmp_path / "P01.csv", tmp_path / "P02.csv"]
     with refused(InputError, expected="different", got=files):
         load_imported(files, parse_map("correct=hit,factor=m"))
+
+
+def test_a_file_is_given_once(tmp_path: Path) -> None:
+    path = tmp_path / "P01.csv"
+    path.write_text("m,hit\na,1\nb,0\n")
+    with refused(InputError, expected="once", got=path):
+        load_imported([path, tmp_path / "." / "P01.csv"], parse_map("correct=hit"))
+
+
+def test_a_session_without_answers_is_counted(tmp_path: Path) -> None:
+    files = []
+    for who, hits in (
+        (
+            "P1",
+            ",",
+        ),
+        ("P1", "1"),
+        ("P2", "0"),
+        ("P2", "1"),
+    ):
+        files.append(tmp_path / f"{len(files)}.csv")
+        files[-1].write_text(f"id,hit\n{who},{hits.strip(',')}\n{who},{hits.strip(',')}\n")
+    found = load_imported(files, parse_map("participant=id,correct=hit,factor=session"))
+    levels = found.answers.groupby("participant_id")["session"].unique().map(list).to_dict()
+    assert levels == {"P1": ["2"], "P2": ["1", "2"]}
+    assert found.missed == 2
+
+
+def test_a_matrix_needs_lines(tmp_path: Path) -> None:
+    with refused(InputError, expected="class", got="none"):
+        load(tmp_path, "x,a,b\nx,a,b\n", "")
+    with refused(InputError, expected="count", got="'NA'"):
+        load(tmp_path, "x,a,b\na,1,NA\nb,1,1\n", "")
+    found = load(tmp_path, "x,a,b,\u2211\na,1,,1\nb,2,1,3\n\u2211,3,1,4\n", "")
+    assert found.presented == ("a", "b")
+
+
+def test_rows_that_where_leaves_out_may_hold_anything(tmp_path: Path) -> None:
+    text = "phase,f,hit\nmain,10,1\nmain,100,0\ntraining,1.000,x\n"
+    (tmp_path / "P01.csv").write_text(text.replace(",", "\t"))
+    mapping = parse_map("correct=hit,factor=f", where=[("phase", "main")])
+    found = load_imported([tmp_path / "P01.csv"], mapping)
+    assert mean_by(found, "f") == {"10": 1.0, "100": 0.0}

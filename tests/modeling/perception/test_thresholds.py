@@ -218,3 +218,18 @@ def test_levels_and_frequencies_of_no_threshold(
 ) -> None:
     with refused(InputError, expected=["1e-09 to 1e+06 g", "'lab'"], got=got):
         Threshold("lab", frequencies, levels, "test", "none")
+
+
+def test_notes_of_a_table_that_a_spreadsheet_wrote(tmp_path: Path) -> None:
+    lines = [
+        '"# source: A, ""B"""',
+        "# caveat: none",
+        "frequency_hz;acceleration_g",
+        "10;0,5",
+        "20;1",
+    ]
+    for encoding in ("utf-8-sig", "utf-16"):
+        (tmp_path / "lab.csv").write_bytes("\r\n".join(lines).encode(encoding))
+        found = Threshold.load(tmp_path / "lab.csv")
+        assert (found.source, found.caveat) == ('A, "B"', "none")
+        assert found.acceleration_g.tolist() == [0.5, 1.0]

@@ -64,6 +64,7 @@ LOGS = {
     ),
     "names of rows": (log('"time_s"\t"z_g"\n', '"r{n}"\t{t}\t{z}'), "", {}),
     "lines at the end": (log("time_s,z_g\n", "{t},{z}", tail="END OF FILE\n"), "", {}),
+    "sums at the end": (log("time_s,z_g\n", "{t},{z}", tail="Mean,1.0\nSD:,0.2\n"), "", {}),
     "quotes everywhere": (log('"time_s","z_g"\n', '"{t}","{z}"'), "", {}),
     "old Macs": (log("time_s,z_g\n", "{t},{z}", line_end="\r"), "", {}),
     "Windows": (log("time_s;z_g\n", "{t};{z}", line_end="\r\n"), "", {}),
@@ -211,3 +212,18 @@ def test_the_finer_of_two_clocks_is_taken(tmp_path: Path) -> None:
     found = import_csv_file(tmp_path / "a.csv", LABEL, axis="z")
     assert found.recording.rate_hz == pytest.approx(RATE_HZ)
     assert found.recording.samples.size == Z.size
+
+
+def test_batches_whose_stamps_differ_are_no_recording(tmp_path: Path) -> None:
+    stamps = np.floor(TIME_S * 100) / 100 + np.tile(np.arange(20), 20) * 1e-6
+    rows = (f"{t:.6f},{z:.5f}" for t, z in zip(stamps.tolist(), Z.tolist(), strict=True))
+    (tmp_path / "a.csv").write_text("\n".join(("time_s,z_g", *rows, "")))
+    for rate_hz in (None, RATE_HZ):
+        with refused(InputError, expected=["breaks", "a.csv"], got=["either", "or", "--rate"]):
+            import_csv_file(tmp_path / "a.csv", LABEL, rate_hz=rate_hz)
+
+
+def test_a_column_has_one_role(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(log("time_s,z_g\n", "{t},{z}"))
+    with refused(InputError, expected="once", got=["time", "z"]):
+        import_csv_file(tmp_path / "a.csv", LABEL, named={"time": "#1", "z": "time_s"})

@@ -148,3 +148,9 @@ def test_a_clock_that_changed_once_gives_no_rate() -> None:
     with refused(InputError, expected="change", got=["1 change", "--rate"]):
         time.rate_hz()
     assert time.contradiction(RATE_HZ) is None
+
+
+def test_only_a_counter_begins_again() -> None:
+    ns = np.where(np.arange(4000) < 2000, 0, -16_500_000) + np.arange(4000) * 1e6 + 1e12
+    assert (unwrapped(ns) == ns).all()
+    assert rows(column(ns, "ns")) in ((0, 2000), (2000, 4000))
