@@ -46,6 +46,13 @@ REMARKS = (
 BOOLS = (("0", "1"), ("false", "true"), ("FALSE", "TRUE"), ("False", "True"), ("wrong", "hit"))
 
 
+# A refusal names the damaged place, both readings, or what is missing of the whole file.
+PLACE_OR_READINGS = re.compile(
+    r"line \d+|, which is .* or |lines that fit .* or |one number or two names|got none;|"
+    r"\d lines?;|classes in|--right"
+)
+
+
 @dataclass
 class Truth:
     """Trials: participant, levels, and what was measured, None where nothing was answered."""
@@ -248,7 +255,7 @@ def check_read_or_refused(folder: Path, seed: int) -> tuple[bool, bool]:
         found = load_imported([path], mapping)
     except InputError as refusal:
         said = str(refusal)
-        assert re.search(r"line \d+| or |got none|\d lines?;|classes in", said), said
+        assert PLACE_OR_READINGS.search(said), said
         return dialect.is_unambiguous, False
     measures = ["presented", "answered"] if presents else [found.measure]
     columns = ["participant_id", *found.factors, *measures]
