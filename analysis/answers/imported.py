@@ -20,7 +20,7 @@ from tactileq.analysis.answers.matrices import (
     expected_copies,
 )
 from tactileq.analysis.answers.table_map import OF_FILES, TableMap
-from tactileq.analysis.answers.table_rows import Noted, code_of, trials
+from tactileq.analysis.answers.table_rows import RIGHT, Noted, code_of, trials
 from tactileq.modeling import InputError
 from tactileq.modeling.errors import counted, shown
 from tactileq.modeling.files.others.named_table import read_other_table
@@ -173,6 +173,13 @@ class _Found(Noted):
     def _check_codes(self) -> None:
         """Refuse a code of right answers that a file does not know, or beside which none is."""
         right = code_of(self.mapping.right)
+        every = set().union(*self.codes.values())
+        if every & set(RIGHT) and every & {"0", "1"}:
+            raise InputError(
+                f"expected one way of writing right and wrong in column "
+                f"{shown(self.mapping.correct)}, got {shown(', '.join(sorted(every)))}; write them "
+                "alike, or leave --right out."
+            )
         beside = set().union(*(codes for codes in self.codes.values() if right in codes))
         for path, codes in self.codes.items():
             if codes and not set(codes) <= beside:

@@ -145,7 +145,7 @@ def _without_sums(
     ):
         sums = [names[place]] if place is not None else []
         for name in names:
-            by_name = is_named_sum(name)
+            by_name = _heads_sums(name)
             by_counts = name in sums and (both or by_name or name not in others)
             if by_counts != by_name and not (both and by_counts):
                 what_it_is = "sums of the others" if by_counts else "other counts than sums"
@@ -156,16 +156,21 @@ def _without_sums(
                 )
             if by_counts:
                 notes.append(f"the {what} {shown(name)} is no class, as it holds sums")
-        left_out = sums if both or (sums and is_named_sum(sums[0])) else []
+        left_out = sums if both or (sums and _heads_sums(sums[0])) else []
         kept.append([i for i, name in enumerate(names) if name not in left_out])
     return kept[0], kept[1], tuple(notes)
 
 
 def is_named_sum(name: str, *, is_level: bool = False) -> bool:
     """Whether a name says that it sums others up; a level may be called All."""
-    words = {*re.split(r"[\W\d_]+", name.casefold()), name.casefold()} - {""}
-    alone = name.casefold().strip(" ():.")
-    return bool(words & SUMS) or alone in MEANS or (alone == "all" and not is_level)
+    alone = name.casefold().strip(" ():._")
+    return alone in SUMS | MEANS or (alone == "all" and not is_level)
+
+
+def _heads_sums(name: str) -> bool:
+    """Whether a row or column of a matrix is called so: Row total, (all), sum_1."""
+    words = {*re.split(r"[\W\d_]+", name.casefold()), name.casefold()}
+    return not SUMS.isdisjoint(words) or is_named_sum(name)
 
 
 def _place_of_sum(counts: Counts) -> int | None:
@@ -202,7 +207,8 @@ def _check_others(
         if name in presented:
             continue
         own = counts[:, place]
-        if (own == hits).all() or (own >= sums).all() or _OF_TRIALS.fullmatch(name.casefold()):
+        is_number_of_trials = (own == own[0]).all() and (own >= sums).all()
+        if (own == hits).all() or is_number_of_trials or _OF_TRIALS.fullmatch(name.casefold()):
             raise InputError(
                 f"expected answers in each column of {table.path}, got {shown(name)}, which may "
                 "count hits or trials; remove the column if it is no answer."

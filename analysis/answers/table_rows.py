@@ -93,7 +93,7 @@ class _Rows:
         chosen = np.ones(len(table.lines), dtype=bool)
         for column, values in self.mapping.where.items():
             wanted = set(map(code_of, values))
-            cells = table.cells(column)
+            cells = table.cells(column, may_be_cut=True)
             fits = np.array([code_of(cell) in wanted for cell in cells], dtype=bool)
             if not fits.any():
                 there = ", ".join(list(dict.fromkeys(cells))[:5])
@@ -245,13 +245,23 @@ class _Rows:
     def _refuse_sums(self, rows: Mask) -> None:
         """Refuse rows that by their names sum others up: they would count once more."""
         for role, cells in self._names.items():
+            times = Counter(cells)
+            usual = max(times.values(), default=0) / 2
             for place in np.flatnonzero(rows).tolist():
-                if is_named_sum(cells[place], is_level=role in self.factors):
+                name, is_level = cells[place], role in self.factors
+                # A level of as many trials as others sums nothing up.
+                is_condition = is_level and self._is_of_trials and times[name] >= usual
+                if is_named_sum(name, is_level=is_level) and not is_condition:
                     raise InputError(
-                        f"expected a row of one {'level' if role in self.factors else role} in "
-                        f"{self._where(place, whole=True)}, got {shown(cells[place])}, which is a "
-                        "name, or sums other rows up; rename it, or remove the row."
+                        f"expected a row of one {'level' if is_level else role} in "
+                        f"{self._where(place, whole=True)}, got {shown(name)}, which is a name, or "
+                        "sums other rows up; rename it, or remove the row."
                     )
+
+    @property
+    def _is_of_trials(self) -> bool:
+        """Whether a row is a trial, and no summary of some."""
+        return not (self.mapping.count or self.mapping.share)
 
     def _refuse_first(self, wrong: Mask, levels: Sequence[str]) -> None:
         for place in np.flatnonzero(wrong)[:1].tolist():

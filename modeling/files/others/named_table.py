@@ -89,10 +89,14 @@ def _without_blank_ends(lines: Sequence[TableLine]) -> list[TableLine]:
 
 
 def _is_header(lines: Sequence[TableLine], wanted: Sequence[str]) -> bool:
-    """Whether the first line names columns: its cells are no numbers and do not occur again."""
+    """Whether the first line names columns: its cells are no numbers and do not occur again.
+
+    But for the whole line, which joined tables hold again.
+    """
+    others = [line for line in lines[1:] if line.cells != lines[0].cells]
     for name in wanted:
         place = int(name[1:]) - 1
-        cells = [line.cells[place] for line in lines if place < len(line.cells)]
+        cells = [line.cells[place] for line in (lines[0], *others) if place < len(line.cells)]
         if cells and (is_number(cells[0]) or cells[0] in cells[1:]):
             return False
     return True

@@ -61,8 +61,8 @@ def read_number_table(
             f"expected a header and rows of numbers in {path.name}, got {got}; export or record it "
             "again."
         )
-    _check_run(lines, run, path)
     header, names = _names_above(lines[: run.start], run, wanted=wanted, is_unit=is_unit)
+    _check_run(lines, run, path, begins=header.number if header else 0)
     if not names:
         if not any(map(number_of, wanted)):
             raise InputError(
@@ -136,8 +136,11 @@ def _run_of_numbers(lines: Sequence[TableLine]) -> _Run | None:
     return replace(run, start=rows[0], stop=last + 1)
 
 
-def _check_run(lines: Sequence[TableLine], run: _Run, path: Path) -> None:
-    """Refuse numbers outside of the run: a damaged line splits what was one."""
+def _check_run(lines: Sequence[TableLine], run: _Run, path: Path, *, begins: int) -> None:
+    """Refuse numbers outside of the run: a damaged line splits what was one.
+
+    But for one line above that of names, whose number is `begins`: the rest of a row.
+    """
     for line in lines[run.stop :]:
         if _is_word(line.cells[min(run.columns[0], len(line.cells) - 1)]):
             continue  # Mean,0.95: what sums the rows up is none of them
@@ -160,9 +163,10 @@ def _check_run(lines: Sequence[TableLine], run: _Run, path: Path) -> None:
         for place, line in enumerate(lines[: run.start])
         if run.holds(line) or sum(map(is_number, line.cells)) > max(1, run.width // 2)
     ]
-    if len(holding) > 1:
+    if len(holding) > 1 or (holding and lines[holding[0]].number > begins):
         after = lines[holding[0] : run.start]
-        raise _damaged(next(line for line in after if not run.holds(line)), run, path)
+        other = next((line for line in after if not run.holds(line)), after[0])
+        raise _damaged(other, run, path)
 
 
 def _damaged(line: TableLine, run: _Run, path: Path) -> InputError:
@@ -182,9 +186,9 @@ def _names_above(
     """
     named = {same_name(name) for name in wanted if number_of(name) is None}
     plain = [line for line in lines if not line.cells[0].startswith("#")] or [
-        replace(line, cells=[line.cells[0].lstrip("# "), *line.cells[1:]]) for line in lines
+        replace(line, cells=_without_mark(line.cells, run.width)) for line in lines
     ]
-    plain = [line for line in plain if not run.holds(line)]
+    plain = [line for line in plain if not _holds_numbers(line)]
     by_number = bool(wanted) and not named
     if not plain or (by_number and len(plain[-1].cells) != run.width):
         return None, []
@@ -198,6 +202,12 @@ def _names_above(
         for name, unit in zip_longest(header.cells[: header.width], units, fillvalue="")
     ]
     return header, with_units
+
+
+def _without_mark(cells: Sequence[str], width: int) -> list[str]:
+    """Cells without the # that begins their line, and without its cell where it has its own."""
+    first = cells[0].lstrip("# ")
+    return [first, *cells[1:]] if first or len(cells) <= width else list(cells[1:])
 
 
 def _bare(unit: str) -> str:
@@ -215,7 +225,7 @@ def _units(
     cells = [cell for cell in lines[-1].cells if cell]
     known = sum(map(is_unit, cells))
     before = lines[-2]
-    if lines[-2] in fits or before.width == lines[-1].width:
+    if lines[-2] in fits or before.width >= lines[-1].width:
         has_numbers = lines[-2] not in fits and any(map(is_number, before.cells))
         return list(lines[-1].cells) if known and not has_numbers else []
     return []

@@ -136,7 +136,8 @@ class Numbers:
     def _nearest(self) -> Style:
         """The style that most cells fit."""
         cells = [cell for column in self.seen.values() for cell in column]
-        candidates = [PLAIN_STYLE, *_possible(cells)]
+        every = (PLAIN_STYLE, Style(self.decimal or ".", ""), *_possible(cells))
+        candidates = [style for style in every if self.decimal in ("", style.decimal)]
         return max(candidates, key=lambda style: sum(_fits(style, cell) for cell in cells))
 
 

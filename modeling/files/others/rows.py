@@ -47,10 +47,8 @@ def table_below(
         left_out["repeat the header"] = [line.number for line in again]
         numbers = set(left_out["repeat the header"])
         below = [line for line in below if line.number not in numbers]
-    if len(names) > 1 and len(below) > 1 and _ends_table(below[-1]):
+    if len(names) > 1 and len(below) > 1 and _ends_table(below[-1], separator):
         left_out["end the table"] = [below.pop().number]
-    if separator == " ":  # among blanks, no cell can be seen to be missing
-        check_whole(below, path, least=len(names))
     check_spans(below, len(names), path)
     is_open = False
     decided: tuple[str, ...] = ()
@@ -63,7 +61,7 @@ def table_below(
         if may_be_names and not ends_blank and separator in "\t " and len(below) > 1:
             names = ["", *names]
             decided = ("the first cell of each line is taken as the name of a row",)
-    _check_lengths(below, names, path)
+    _check_lengths(below, names, path, separator=separator)
     full = [_full_line(line, len(names), path) for line in below]
     return OtherTable(
         path,
@@ -118,7 +116,9 @@ def _may_be_row_names(cells: Sequence[str]) -> bool:
     )
 
 
-def _check_lengths(lines: Sequence[TableLine], names: Sequence[str], path: Path) -> None:
+def _check_lengths(
+    lines: Sequence[TableLine], names: Sequence[str], path: Path, *, separator: str
+) -> None:
     """Refuse lines of other lengths, unless the program leaves out blank cells at their ends.
 
     A cell too many, even a blank one, tells a separator within a cell; one too few, a line end.
@@ -134,7 +134,7 @@ def _check_lengths(lines: Sequence[TableLine], names: Sequence[str], path: Path)
             f"has, got {len(wrong.cells)}; put cells that hold the separator in quotes, or name "
             "all columns."
         )
-    if short and (ends_blank or short == list(lines[-1:])):
+    if short and separator != " " and (ends_blank or short == list(lines[-1:])):
         raise InputError(
             f"expected {counted(most, 'cell')} in {path}, line {short[0].number}, as in other "
             f"lines, got {len(short[0].cells)}: either a line that was cut, or one that is no row; "
@@ -149,12 +149,11 @@ def _check_lengths(lines: Sequence[TableLine], names: Sequence[str], path: Path)
             )
 
 
-def _ends_table(line: TableLine) -> bool:
+def _ends_table(line: TableLine, separator: str) -> bool:
     """Whether a last line is no row: a word alone, or END OF FILE."""
     words = " ".join(filter(None, line.cells))
-    alone = len(line.cells) == 1 and words.isprintable() and not set("\t;,|") & set(words)
-    alone = alone and not is_number(words)
-    return alone or words.casefold() in ("end of file", "eof")
+    is_word = len(line.cells) == 1 and not is_number(words) and not set("\t;,|") & set(words)
+    return (is_word and separator != " ") or words.casefold() in ("end of file", "eof")
 
 
 def _full_line(line: TableLine, width: int, path: Path) -> TableLine:

@@ -10,7 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tactileq.modeling.errors import InputError
-from tactileq.modeling.files.others.splitting import SEPARATORS, TableLine, Text, split
+from tactileq.modeling.files.others.splitting import (
+    SEPARATORS,
+    OpenQuote,
+    TableLine,
+    Text,
+    split,
+)
 
 
 @dataclass(frozen=True)
@@ -55,7 +61,7 @@ def parsed_lines(
 ) -> Parsed:
     """The lines by the separator that fits; refused where two do."""
     found: list[Parsed] = []
-    refusal: InputError | None = None
+    refusal: OpenQuote | None = None
     separators = [text.separator] if text.separator else list(SEPARATORS)
     often = text.content.count
     for separator in sorted(separators, key=lambda one: (one == " ", -often(one))):
@@ -67,9 +73,9 @@ def parsed_lines(
             continue  # blanks stand in texts, too
         try:
             lines = split(text, separator, path, **options)
-        except InputError as error:
-            if separator != " " or not (found or refusal):
-                refusal = refusal or error
+        except OpenQuote as error:
+            if refusal is None or error.line > refusal.line:
+                refusal = error  # of the separator by which the most lines are sound
             continue
         header = header_in(lines)
         one = Parsed(separator, lines, header or 0, header is not None)
@@ -78,10 +84,12 @@ def parsed_lines(
     return _the_one(found, refusal, path)
 
 
-def _the_one(found: Sequence[Parsed], refusal: InputError | None, path: Path) -> Parsed:
+def _the_one(found: Sequence[Parsed], refusal: OpenQuote | None, path: Path) -> Parsed:
     named = [one for one in found if one.has_names]
     several = [one for one in named or found if one.is_even and one.lines]
     wide = [one for one in several if one.width > 1] or several[:1]
+    # Of two that fit, the one by which fewer lines stand above the header.
+    wide = [one for one in wide if one.header == min(other.header for other in wide)]
     if len(wide) > 1:
         kinds = " or ".join(SEPARATORS[one.separator] for one in wide)
         raise InputError(

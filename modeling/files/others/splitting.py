@@ -17,9 +17,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tactileq.modeling.errors import InputError, shown
+from tactileq.modeling.files.others.numbers import is_number
 from tactileq.modeling.files.reading import read_bytes
 
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "blanks"}
+
+
+class OpenQuote(InputError):
+    """A quote that is not closed at the end of its cell, in the line of this index."""
+
+    def __init__(self, sentence: str, *, line: int) -> None:
+        super().__init__(sentence)
+        self.line = line
 
 
 @dataclass(frozen=True)
@@ -49,16 +58,15 @@ class TableLine:
 
     Parameters
     ----------
-    widths : tuple of int
-        Where quoted cells hold line ends: how many cells each line of the file would have if quotes
-        meant nothing.
+    within : tuple of list of str
+        Where quoted cells hold line ends: cells of each line of the file if quotes meant nothing.
     given : int
         How many cells the line has in the file, where others were added; else 0.
     """
 
     number: int
     cells: list[str]
-    widths: tuple[int, ...] = ()
+    within: tuple[list[str], ...] = ()
     given: int = 0
 
     @property
@@ -132,8 +140,8 @@ def split(text: Text, separator: str, path: Path, *, comments: bool = False) -> 
             continue
         ends = sum(cell.count("\n") for cell in cells) if has_quotes else 0
         within = physical[number : min(number + ends + 1, last)] if ends else ()
-        widths = tuple(len(line.split(separator)) for line in within)
-        lines.append(TableLine(number + text.skipped + 1, stripped, widths))
+        apart = tuple(line.split(separator) for line in within)
+        lines.append(TableLine(number + text.skipped + 1, stripped, apart))
     return lines
 
 
@@ -163,22 +171,30 @@ def _with_quotes(
                 if "field larger" in str(error)
                 else "in which a quote opens a cell and is not closed at its end"
             )
-            raise InputError(
+            raise OpenQuote(
                 f"expected quotes only around whole cells in {path}, line {number + skipped + 1}, "
-                f"got {shown(physical[number])}, {damage}; close or remove the quote."
+                f"got {shown(physical[number])}, {damage}; close or remove the quote, and double "
+                "those within a cell.",
+                line=number,
             ) from None
         yield number, cells
 
 
 def check_spans(lines: Sequence[TableLine], width: int, path: Path) -> None:
-    """Refuse a quoted cell over several lines with the separators of two rows or more.
+    """Refuse a quoted cell that runs over lines which may be whole ones without its quotes.
 
-    Without its quotes these lines could be rows: an opening quote would have swallowed them.
+    They cannot be where a column of numbers would hold something else.
     """
+    columns = range(min((len(line.cells) for line in lines), default=0))
+    alone = [line for line in lines if not line.within] or lines
+    numeric = [i for i in columns if all(is_number(line.cells[i] or "0") for line in alone)]
     for line in lines:
-        if line.widths and sum(line.widths) - len(line.widths) >= 2 * (width - 1):
+        if not line.within or min(map(len, (line.within[0], line.within[-1]))) < width:
+            continue
+        last = [cell.strip(' "') for cell in line.within[-1]]
+        if all(is_number(last[i] or "0") for i in numeric if i < len(last)):
             raise InputError(
                 f"expected one reading of {path}, line {line.number}, got a quote that either "
-                f"holds a cell of {len(line.widths)} lines or was not closed, so that lines are "
-                "lost; close or remove the quote."
+                f"holds a cell of {len(line.within)} lines or was not closed, so that lines are "
+                "lost; remove the quote, or the line ends in the cell."
             )

@@ -100,21 +100,35 @@ class OtherTable:
         guessed = not self.text.is_certain and not "".join(self.names).isascii()
         return "save the file as UTF-8" if guessed else "correct --map or --where"
 
-    def cells(self, name: str) -> list[str]:
-        """Cells of a column, from top to bottom."""
+    def cells(self, name: str, *, may_be_cut: bool = False) -> list[str]:
+        """Cells of a column, from top to bottom.
+
+        Parameters
+        ----------
+        may_be_cut : bool
+            Whether lines may have fewer cells, as where they are only chosen by this column.
+
+        Raises
+        ------
+        InputError
+            If it is open which cells are those of the column.
+        """
         place = self.place(name)
         self._check_row_names(place)
+        if may_be_cut:
+            return [line.cells[place] for line in self.lines]
         for line in self.lines:
             is_short = 0 < line.given < len(self.names)
             if is_short and (
-                line.given <= place
+                self.separator == " "  # among which no cell can be seen to be missing
+                or line.given <= place
                 or not line.cells[place]
                 or any(self.separator in cell for cell in line.cells)
             ):
                 raise InputError(
                     f"expected {counted(len(self.names), 'cell')} in {self.where(line)}, got "
-                    f"{line.given} and none for {shown(name)}; complete the line, or remove it if "
-                    "it is none of the table."
+                    f"{line.given} and none for {shown(name)}; complete the line, remove it, "
+                    "or leave it out by --where."
                 )
         return [line.cells[place] for line in self.lines]
 

@@ -119,7 +119,6 @@ def read_log(path: Path, named: Mapping[str, str], axis: Axis | None) -> CsvLog:
     columns = {name: wanted for name, wanted in named.items() if name != "decimal"}
     table = read_number_table(path, "a CSV file", wanted=tuple(columns.values()), is_unit=_is_unit)
     table = replace(table, decimal=named.get("decimal", ""))
-    _check_one_channel(table)
     headers = _headers(table, columns)
     times = [place for place, name in headers.items() if role(name) == "time"]
     clocks = [place for place in times if place not in table.numeric]
@@ -138,6 +137,8 @@ def read_log(path: Path, named: Mapping[str, str], axis: Axis | None) -> CsvLog:
     style = table.numbers([f"#{place + 1}" for place in (*times, *axes)])
     samples = np.array([_samples(table, place, style) for place in axes])
     every = [_time(table, place, headers[place], style) for place in times]
+    if not any(4 * time.repeats < len(table.lines) for time in every):
+        _check_one_channel(table)
     return CsvLog(
         _best(every),
         samples,
@@ -280,12 +281,15 @@ def _best(every: Sequence[TimeColumn]) -> TimeColumn | None:
 
 
 def _check_one_channel(table: OtherTable) -> None:
-    """Refuse a log in long format, where a text says of which channel each row is."""
+    """Refuse a log in long format, where a text says of which channel each row is.
+
+    There times repeat, or there are none.
+    """
     rows = len(table.lines)
     for place, name in enumerate(table.names):
         if not name or place in table.numeric:
             continue
-        cells = [line.cells[place] for line in table.lines]
+        cells = [line.cells[place] for line in table.lines if line.cells[place]]
         changes = sum(a != b for a, b in pairwise(cells))
         if 2 <= len(set(cells)) <= MOST_CHANNELS and changes > rows / 4:
             kinds = shortened(", ".join(sorted(set(cells))))

@@ -49,7 +49,7 @@ def known_unit(text: str) -> str | None:
 
 def _plain(text: str) -> str:
     """In small letters; full-width, raised and other forms of letters and signs as plain ones."""
-    return unicodedata.normalize("NFKC", text).casefold().translate(_MARKS).strip()
+    return unicodedata.normalize("NFKC", text).casefold().translate(_MARKS).strip("\ufeff\u200b \t")
 
 
 def name_and_unit(header: str) -> tuple[str, str]:

@@ -49,7 +49,7 @@ BOOLS = (("0", "1"), ("false", "true"), ("FALSE", "TRUE"), ("False", "True"), ("
 # A refusal names the damaged place, both readings, or what is missing of the whole file.
 PLACE_OR_READINGS = re.compile(
     r"line \d+|, which is .* or |lines that fit .* or |one number or two names|got none;|"
-    r"\d lines?;|classes in|--right"
+    r"\d lines?;|classes in|--right|blank cells?,"
 )
 
 
@@ -174,7 +174,9 @@ def written(truth: Truth, dialect: Dialect, names: Sequence[str], rng: random.Ra
             text, exact = number(float(str(measured)), dialect, dialect.digits)
             truth.trials[place] = (who, levels, exact)
             cells.append(text)
-        cells += [rng.choice(REMARKS) for _ in dialect.extras]
+        # An unclosed quote and an unquoted line end, both, leave nothing that could be told.
+        remarks = REMARKS if dialect.quoting != RAW else [r for r in REMARKS if "\n" not in r]
+        cells += [rng.choice(remarks) for _ in dialect.extras]
         rows.append([cells[i] for i in order])
     lines = [[header[i] for i in order], *rows]
     if dialect.repeats_header and len(lines) > 3:

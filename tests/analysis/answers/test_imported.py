@@ -432,7 +432,7 @@ def test_names_that_look_the_same_are_one(tmp_path: Path) -> None:
     [
         (("hit", "miss"), "hits", "hit, miss"),
         (("x", ""), "x", "1 blank cell"),
-        (("1", "0", "true"), "1", "true"),
+        (("1", "0", "hit"), "1", "hit"),
     ],
 )
 def test_a_code_that_cannot_be_that_of_right_answers(
@@ -442,7 +442,7 @@ def test_a_code_that_cannot_be_that_of_right_answers(
     paths = [tmp_path / "P01.csv"]
     if files[2:]:
         paths.append(tmp_path / "P02.csv")
-        paths[1].write_text(f"id,c\n2,{files[2]}\n2,false\n")
+        paths[1].write_text(f"id,c\n2,{files[2]}\n2,miss\n")
     with refused(InputError, expected=shown(right), got=got):
         load_imported(paths, parse_map("participant=id,correct=c", right=right))
 
@@ -523,3 +523,35 @@ def test_rows_that_where_leaves_out_may_hold_anything(tmp_path: Path) -> None:
     mapping = parse_map("correct=hit,factor=f", where=[("phase", "main")])
     found = load_imported([tmp_path / "P01.csv"], mapping)
     assert mean_by(found, "f") == {"10": 1.0, "100": 0.0}
+
+
+def test_what_ordinary_programs_write_is_read(tmp_path: Path) -> None:
+    again = "id,p,a\nP1,x,x\nP2,y,x\nid,p,a\nP3,z,z\n"
+    found = load(tmp_path, again, "participant=#1,presented=#2,answered=#3")
+    assert list(found.answers["participant_id"]) == ["P1", "P2", "P3"]
+    comment = '"nice\nsoft, warm, a bit, odd"'
+    found = load(tmp_path, f"id,m,hit,note\nP1,a,1,{comment}\nP1,b,0,no\n", "correct=hit,factor=m")
+    assert mean_by(found, "m") == {"a": 1.0, "b": 0.0}
+    (tmp_path / "P01.csv").write_text("fixation 400\nmain full 1\nmain simple 2\n")
+    mapping = parse_map("correct=#3,factor=#2", where=[("#1", "main")], right="1")
+    found = load_imported([tmp_path / "P01.csv"], mapping)
+    assert mean_by(found, "#2") == {"full": 1.0, "simple": 0.0}
+    found = load(tmp_path, ",a,b,don't know\na,2,1,12\nb,2,1,9\n", "")
+    assert found.classes == ("a", "b", "don't know")
+    german = "wer;was;wert\nP1;a;3,5\nP1;b;4,5\n"
+    found = load(tmp_path, german, "participant=#1,factor=#2,value=#3")
+    assert mean_by(found, "#2") == {"a": 3.5, "b": 4.5}
+    found = load(tmp_path, "m,v\nTotal contact,1\nMean,2\nMean,3\n", "value=v,factor=m")
+    assert mean_by(found, "m") == {"Total contact": 1.0, "Mean": 2.5}
+
+
+def test_a_refusal_names_the_line_that_is_damaged(tmp_path: Path) -> None:
+    rows = "".join(f'"{n}" "P{n}" {n / 8} "ok"\n' for n in range(1, 8))
+    text = f'"id" "v" "note"\n{rows}"8" "P8" 1 "he said \\"hm\\""\n'
+    with refused(InputError, expected=["quotes", "line 9"], got="not closed"):
+        load(tmp_path, text, "participant=id,value=v")
+    with refused(InputError, expected=["number", "line 2"], got="'0.5'"):
+        load(tmp_path, "m;v\na;0.5\nb;1.5\n", "value=v,decimal=comma")
+    with refused(InputError, expected="one way", got="0, 1, true"):
+        (tmp_path / "P01.csv").write_text("hit\n1\n0\ntrue\n")
+        load_imported([tmp_path / "P01.csv"], parse_map("correct=hit", right="1"))

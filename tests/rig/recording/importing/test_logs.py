@@ -75,6 +75,14 @@ LOGS = {
     ),
     "a unit with brackets": (log("T,A\nms,m/(s^2)\n", "{ms},{si}"), "time=T,z=A", {}),
     "three lines of names": (log("t,A_Z\nCAL,CAL\nms,g\n", "{ms},{z}"), "time=t,z=A_Z", {}),
+    "units, the last one blank": (log("Time,acc_z,Count\ns,g,\n", "{t},{z},1"), "", {"axis": "z"}),
+    "names in a comment of blanks": (log("# time_s z_g\n", "{t} {z}"), "", {}),
+    "a flag in every other row": (
+        log("time_s,z_g,flag\n", "{t},{z},on").replace("1,on\n", "1,off\n"),
+        "",
+        {"axis": "z"},
+    ),
+    "unseen letters": (log("\u200btime_s,z_g\n", "{t},{z}"), "", {}),
     "names in a comment": (log("# time_s,z_g\n", "{t},{z}"), "", {}),
     "comments": (log("#Device: a\n#Rate: 2 kHz\ntime_s,z_g\n", "{t},{z}"), "", {}),
     "a start, no names": (log("started\n", "{t},{z}"), "time=#1,z=#2", {"unit": "g"}),
@@ -212,6 +220,14 @@ def test_the_finer_of_two_clocks_is_taken(tmp_path: Path) -> None:
     found = import_csv_file(tmp_path / "a.csv", LABEL, axis="z")
     assert found.recording.rate_hz == pytest.approx(RATE_HZ)
     assert found.recording.samples.size == Z.size
+
+
+def test_no_sample_is_taken_for_a_line_of_names(tmp_path: Path) -> None:
+    head, first, *others = log("time_s,z_g,note\n", "{t},{z}").splitlines()
+    (tmp_path / "a.csv").write_text("\n".join((head, f"{first},go", *others, "")))
+    for named in ({}, {"time": "#1", "z": "#2"}):
+        with refused(InputError, expected=["values", "line 2"], got=3):
+            import_csv_file(tmp_path / "a.csv", LABEL, named=named, axis="z", unit="g")
 
 
 def test_batches_whose_stamps_differ_are_no_recording(tmp_path: Path) -> None:
