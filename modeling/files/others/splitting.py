@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tactileq.modeling.errors import InputError, shown
-from tactileq.modeling.files.others.numbers import is_number
+from tactileq.modeling.files.others.numbers import NO_NUMBER, is_number
 from tactileq.modeling.files.reading import read_bytes
 
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "blanks"}
@@ -180,6 +180,10 @@ def _with_quotes(
         yield number, cells
 
 
+def _may_be_number(cell: str) -> bool:
+    return is_number(cell) or cell.casefold() in NO_NUMBER
+
+
 def check_spans(lines: Sequence[TableLine], width: int, path: Path) -> None:
     """Refuse a quoted cell that runs over lines which may be whole ones without its quotes.
 
@@ -187,12 +191,17 @@ def check_spans(lines: Sequence[TableLine], width: int, path: Path) -> None:
     """
     columns = range(min((len(line.cells) for line in lines), default=0))
     alone = [line for line in lines if not line.within] or lines
-    numeric = [i for i in columns if all(is_number(line.cells[i] or "0") for line in alone)]
+    numeric = [
+        i
+        for i in columns
+        if all(_may_be_number(line.cells[i]) for line in alone)
+        and any(is_number(line.cells[i]) for line in alone)
+    ]
     for line in lines:
         if not line.within or min(map(len, (line.within[0], line.within[-1]))) < width:
             continue
         last = [cell.strip(' "') for cell in line.within[-1]]
-        if all(is_number(last[i] or "0") for i in numeric if i < len(last)):
+        if all(_may_be_number(last[i]) for i in numeric if i < len(last)):
             raise InputError(
                 f"expected one reading of {path}, line {line.number}, got a quote that either "
                 f"holds a cell of {len(line.within)} lines or was not closed, so that lines are "
