@@ -20,6 +20,7 @@ from tactileq.modeling.errors import InputError, shown
 from tactileq.modeling.files.others.numbers import NO_NUMBER, is_number
 from tactileq.modeling.files.reading import read_bytes
 
+_ENOUGH = 5  # numbers that make a column one of numbers
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "blanks"}
 
 
@@ -195,7 +196,7 @@ def check_spans(lines: Sequence[TableLine], width: int, path: Path) -> None:
         i
         for i in columns
         if all(_may_be_number(line.cells[i]) for line in alone)
-        and any(is_number(line.cells[i]) for line in alone)
+        and sum(is_number(line.cells[i]) for line in alone) >= _ENOUGH
     ]
     for line in lines:
         if not line.within or min(map(len, (line.within[0], line.within[-1]))) < width:

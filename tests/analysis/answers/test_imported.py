@@ -530,7 +530,8 @@ def test_what_ordinary_programs_write_is_read(tmp_path: Path) -> None:
     found = load(tmp_path, again, "participant=#1,presented=#2,answered=#3")
     assert list(found.answers["participant_id"]) == ["P1", "P2", "P3"]
     comment = '"nice\nsoft, warm, a bit, odd"'
-    found = load(tmp_path, f"id,m,hit,note\nP1,a,1,{comment}\nP1,b,0,no\n", "correct=hit,factor=m")
+    text = f"id,m,hit,note\nP1,a,1,{comment}\n" + "P1,b,0,no\n" * 5
+    found = load(tmp_path, text, "correct=hit,factor=m")
     assert mean_by(found, "m") == {"a": 1.0, "b": 0.0}
     (tmp_path / "P01.csv").write_text("fixation 400\nmain full 1\nmain simple 2\n")
     mapping = parse_map("correct=#3,factor=#2", where=[("#1", "main")], right="1")
