@@ -173,7 +173,8 @@ def played_freely(
 
 def together(captured: Array, wanted: Array) -> tuple[Array, Array]:
     """What left from where a presentation began, and the presentation, as long as both last."""
-    loud = FADE + int(np.argmax(np.abs(wanted[FADE:RATE_HZ])))
+    # The first second may be silent: on a busy machine it is over before the hand has moved.
+    loud = FADE + int(np.argmax(np.abs(wanted[FADE : wanted.size // 2])))
     near = np.abs(captured - wanted[loud]) <= 1e-6 * np.abs(wanted).max()
     seen = 500  # samples from there on by which one place is told from another
     places = [at for at in np.flatnonzero(near) if loud <= at < captured.size - seen]

@@ -558,7 +558,7 @@ def test_a_time_that_repeats_is_passed_over(tmp_path: Path) -> None:
     time_s[1000] = time_s[999]
     columns = np.vstack([time_s, np.sin(2 * np.pi * 60 * time_s)])
     path = write_csv(tmp_path / "a.csv", "time_s,x_g", columns)
-    found = import_csv([path], [LABEL]).recordings[0]
+    found = import_csv_file(path, LABEL).recording
     even_s = time_s[0] + np.arange(found.samples.size) / found.rate_hz
     away = found.samples - np.sin(2 * np.pi * 60 * even_s)
     assert np.abs(away[20:-20]).max() < 1e-3
