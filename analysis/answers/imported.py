@@ -26,7 +26,7 @@ from tactileq.modeling.errors import counted, shown
 from tactileq.modeling.files.others.named_table import read_other_table
 from tactileq.modeling.files.others.table import OtherTable, first_few, left_out_sentence
 
-FEWEST_COPIES = 0.01  # expected number of equal files by chance, from which on they may be
+FEWEST_COPIES = 0.05  # expected number of equal files by chance, from which on they may be
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,29 +197,36 @@ class _Found(Noted):
             )
 
     def _check_copies(self, rows: pd.DataFrame) -> None:
-        """Refuse two files that hold the same, unless that may well be by chance."""
+        """Refuse two files that hold the same, unless that may well be by chance.
+
+        Where all their cells are the same, those of columns that are not taken count, too.
+        """
+        whole = {str(t.path): [tuple(line.cells) for line in t.lines] for t in self.tables}
+        groups = rows.groupby("from_file", sort=False).groups
+        measure = next(name for name in ("value", "correct", "answered") if name in rows)
+        alike = {path for path, own in groups.items() if rows.loc[own, measure].nunique() < 2}
+        others = {"participant_id", "from_file", "line", *OF_FILES}
+        answers = rows.drop(columns=[name for name in rows if name in others])
+        held: dict[str, list[object]] = {
+            str(path): list(map(tuple, answers.loc[own].to_numpy())) for path, own in groups.items()
+        }
         if self.matrices:
-            paths = [str(table.path) for table in self.tables]
-            held: list[list[object]] = [list(matrix.counts.flat) for matrix in self.matrices]
-        else:
-            others = {"participant_id", "from_file", "line", *OF_FILES}
-            answers = rows.drop(columns=[name for name in rows if name in others])
-            groups = rows.groupby("from_file", sort=False).groups
-            paths = [str(path) for path in groups]
-            held = [list(map(tuple, answers.loc[own].to_numpy())) for own in groups.values()]
-        first: dict[tuple[object, ...], int] = {}
-        for place, own in enumerate(held):
-            before = first.setdefault(tuple(own), place)
-            if before == place:
+            counts = (list(matrix.counts.flat) for matrix in self.matrices)
+            held = dict(zip(whole, counts, strict=True))
+        first: dict[tuple[object, ...], str] = {}
+        for path, own in held.items():
+            before = first.setdefault(tuple(own), path)
+            if before == path:
                 continue
-            alike = len({str(answer) for answer in own}) < 2
-            if not alike and expected_copies(held, place) < FEWEST_COPIES:
+            every = whole if whole[path] == whole[before] else held
+            places = [every[other] for other in held]
+            by_chance = expected_copies(places, list(held).index(path))
+            if path not in alike and by_chance < FEWEST_COPIES:
                 raise InputError(
-                    f"expected different answers in each file, got the same in {paths[before]} and "
-                    f"{paths[place]}; leave one out, since a copy would count as another "
-                    "participant."
+                    f"expected different answers in each file, got the same in {before} and "
+                    f"{path}; leave one out, since a copy would count as another participant."
                 )
-            self.equal.append(f"{Path(paths[before]).name} and {Path(paths[place]).name}")
+            self.equal.append(f"{Path(before).name} and {Path(path).name}")
 
     def classes(self, rows: pd.DataFrame) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """The classes that were presented, and all with what else was answered."""
