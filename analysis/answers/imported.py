@@ -211,8 +211,10 @@ class _Found(Noted):
             str(path): list(map(tuple, answers.loc[own].to_numpy())) for path, own in groups.items()
         }
         if self.matrices:
-            counts = (list(matrix.counts.flat) for matrix in self.matrices)
-            held = dict(zip(whole, counts, strict=True))
+            held = {
+                path: [*matrix.counts.flat]
+                for path, matrix in zip(whole, self.matrices, strict=True)
+            }
         first: dict[tuple[object, ...], str] = {}
         for path, own in held.items():
             before = first.setdefault(tuple(own), path)
