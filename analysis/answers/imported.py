@@ -75,10 +75,9 @@ def load_imported(files: Sequence[str | Path], mapping: TableMap) -> ImportedAns
     InputError
         Naming file and line, where a table does not hold what the map says, or has two readings.
     """
-    check_sessions(mapping)
-    places = [Path(path).resolve() for path in files]
-    for place in places:
-        if places.count(place) > 1:
+    _check_sessions(mapping)
+    for place, times in Counter(Path(path).resolve() for path in files).items():
+        if times > 1:
             raise InputError(f"expected each file once, got {place} again; leave one out.")
     found = _Found(mapping)
     for path in files:
@@ -272,7 +271,7 @@ class _Found(Noted):
         return tuple(sentences)
 
 
-def check_sessions(mapping: TableMap) -> None:
+def _check_sessions(mapping: TableMap) -> None:
     """Refuse sessions by file without a column of participants: each file would be somebody."""
     if "session" in mapping.factors and not (mapping.participant or mapping.is_matrix):
         raise InputError(

@@ -98,13 +98,13 @@ class Labels:
     def notes(self) -> list[str]:
         """A sentence where names that are spelt differently were taken as one."""
         same = [
-            " = ".join(map(ascii_where_alike, (first, *sorted(others))))
+            " = ".join(map(_ascii_where_alike, (first, *sorted(others))))
             for first, others in self._others.items()
         ]
         return [f"Taken as one name each: {first_few(same)}."] if same else []
 
 
-def ascii_where_alike(name: str) -> str:
+def _ascii_where_alike(name: str) -> str:
     """A name in quotes, in which letters that are not seen are written out."""
     return repr(name) if not _HIDDEN.search(name) else ascii(name)
 

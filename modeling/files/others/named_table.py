@@ -12,7 +12,7 @@ from statistics import mode
 
 from tactileq.modeling.errors import InputError, counted
 from tactileq.modeling.files.others.numbers import is_number
-from tactileq.modeling.files.others.rows import check_whole, table_below
+from tactileq.modeling.files.others.rows import table_below
 from tactileq.modeling.files.others.separators import Parsed, parsed_lines
 from tactileq.modeling.files.others.splitting import TableLine, read_other_text
 from tactileq.modeling.files.others.table import OtherTable, number_of, same_name
@@ -72,7 +72,7 @@ def read_other_table(
     if is_declared:
         lines = _without_blank_ends(lines[header:])
         header = 0
-        check_whole(lines[1:], path, least=len(lines[0].cells), exact=True)
+        _check_whole(lines, path)
     table = table_below(Parsed(parsed.separator, lines, header), text, path, wanted=named)
     above = [line.number for line in lines[:header]]
     left_out = {"stand above the header": above, **table.left_out}
@@ -86,6 +86,17 @@ def _without_blank_ends(lines: Sequence[TableLine]) -> list[TableLine]:
         replace(line, cells=line.cells[:width]) if line.width <= width < len(line.cells) else line
         for line in lines
     ]
+
+
+def _check_whole(lines: Sequence[TableLine], path: Path) -> None:
+    """Refuse lines that have another number of cells than the first one."""
+    width = len(lines[0].cells)
+    for line in lines[1:]:
+        if len(line.cells) != width:
+            raise InputError(
+                f"expected {counted(width, 'cell')} in line {line.number} of {path}, got "
+                f"{len(line.cells)}; correct it, since the table is damaged."
+            )
 
 
 def _is_header(lines: Sequence[TableLine], wanted: Sequence[str]) -> bool:

@@ -167,13 +167,3 @@ def _full_line(line: TableLine, width: int, path: Path) -> TableLine:
         )
     cells = [*line.cells[:width], *[""] * (width - len(line.cells))]
     return replace(line, cells=cells, given=len(line.cells))
-
-
-def check_whole(lines: Sequence[TableLine], path: Path, *, least: int, exact: bool = False) -> None:
-    """Refuse lines with fewer cells, or with another number of them."""
-    for line in lines:
-        if len(line.cells) < least or (exact and len(line.cells) > least):
-            raise InputError(
-                f"expected {counted(least, 'cell')} in line {line.number} of {path}, got "
-                f"{len(line.cells)}; correct it, since the table is damaged."
-            )

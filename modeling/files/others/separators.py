@@ -57,9 +57,13 @@ class Parsed:
 
 
 def parsed_lines(
-    text: Text, path: Path, header_in: Callable[[Sequence[TableLine]], int | None], **options: bool
+    text: Text,
+    path: Path,
+    header_in: Callable[[Sequence[TableLine]], int | None],
+    *,
+    comments: bool = False,
 ) -> Parsed:
-    """The lines by the separator that fits; refused where two do."""
+    """The lines by the separator that fits; refused where two do. `comments`: as in `split`."""
     found: list[Parsed] = []
     refusal: OpenQuote | None = None
     separators = [text.separator] if text.separator else list(SEPARATORS)
@@ -72,7 +76,7 @@ def parsed_lines(
         if separator == " " and any(one.width > 1 for one in found):
             continue  # blanks stand in texts, too
         try:
-            lines = split(text, separator, path, **options)
+            lines = split(text, separator, path, comments=comments)
         except OpenQuote as error:
             if refusal is None or error.line > refusal.line:
                 refusal = error  # of the separator by which the most lines are sound

@@ -8,6 +8,7 @@ from __future__ import annotations
 import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from tactileq.modeling.arrays import Floats
@@ -115,11 +116,8 @@ class OtherTable:
         """
         place = self.place(name)
         self._check_row_names(place)
-        if may_be_cut:
-            return [line.cells[place] for line in self.lines]
-        for line in self.lines:
-            is_short = 0 < line.given < len(self.names)
-            if is_short and (
+        for line in () if may_be_cut else self._short_lines:
+            if (
                 self.separator == " "  # among which no cell can be seen to be missing
                 or line.given <= place
                 or not line.cells[place]
@@ -131,6 +129,11 @@ class OtherTable:
                     "or leave it out by --where."
                 )
         return [line.cells[place] for line in self.lines]
+
+    @cached_property
+    def _short_lines(self) -> list[TableLine]:
+        """Lines with fewer cells than names."""
+        return [line for line in self.lines if 0 < line.given < len(self.names)]
 
     def _check_row_names(self, place: int) -> None:
         if self.has_open_row_names and place < len(self.names) - 1:
@@ -151,12 +154,7 @@ class OtherTable:
         InputError
             If two ways fit and give other numbers.
         """
-        own = [self.names[self.place(name)] for name in columns]
-        shown_as = [
-            name if own.count(name) == 1 else given
-            for name, given in zip(own, columns, strict=True)
-        ]
-        cells = dict(zip(shown_as, map(self.cells, columns), strict=True))
+        cells = {name: self.cells(name) for name in columns}
         seen = Numbers(cells, decimal=self.decimal, whole=whole)
         return seen.style(
             self.path,

@@ -6,8 +6,9 @@ docs/method/recordings.md#headers-and-units
 from __future__ import annotations
 
 import re
-import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
+
+from tactileq.modeling.files.others.table import same_name
 
 # As `known_unit` compares them: in small letters, without blanks, dots and signs of powers; µ is u.
 SPELLINGS: Mapping[str, Sequence[str]] = {
@@ -49,7 +50,7 @@ def known_unit(text: str) -> str | None:
 
 def _plain(text: str) -> str:
     """In small letters; full-width, raised and other forms of letters and signs as plain ones."""
-    return unicodedata.normalize("NFKC", text).casefold().translate(_MARKS).strip("\ufeff\u200b \t")
+    return same_name(text).translate(_MARKS)
 
 
 def name_and_unit(header: str) -> tuple[str, str]:
