@@ -215,7 +215,8 @@ TQ_INLINE void tq_sound_mind(tq_sound *s, double now_s)
     s->halted = s->halted_s == asked_s;
 }
 
-/* Sets what the player has to play, which is silence while a signal plays. */
+/* Sets what the player has to play, which is silence while a signal plays. Once per block: a voice that
+   began amid one could not be rendered again from the log, which knows no smaller step. */
 TQ_INLINE void tq_sound_tell(tq_sound *s)
 {
     tq_surface *u = s->halted || TQ_GET(&s->signal_playing) ? NULL : TQ_GET(&s->surface_wanted);
@@ -294,7 +295,6 @@ TQ_INLINE void tq_piece_render(tq_sound *s, tq_block *block, float *out, size_t 
     tq_signal *signal;
     uint32_t before = tq_surface_now(s), after;
     size_t n;
-    tq_sound_tell(s);
     tq_player_render(&s->player, piece, count);
     after = tq_surface_now(s);
     if (before || after)
@@ -329,6 +329,7 @@ static tq_block tq_sound_block(tq_sound *s, double now_s, float *out, size_t fra
     block.position = s->position, block.frames = (uint32_t)frames;
     tq_hand_take(s, &block);
     tq_sound_mind(s, now_s);
+    tq_sound_tell(s);
     if (s->halted)
         block.flags |= TQ_NO_HEARTBEAT;
     TQ_FILL(out, 0, frames * (size_t)s->channels * sizeof *out);

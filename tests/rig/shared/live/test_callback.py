@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from typing import Any
 
@@ -61,6 +62,25 @@ def test_all_that_was_played_counts_for_its_presentation(live: Live, frames: int
     wanted = float((np.concatenate(played).astype(np.float64) ** 2).sum())
     assert own["square_sum_g2"].sum() == pytest.approx(wanted, rel=1e-9)
     assert wanted > 0
+
+
+def test_what_is_asked_for_while_a_block_is_rendered_begins_with_the_next(live: Live) -> None:
+    """From its first sample: one that began amid a block could not be rendered again by the log."""
+    callback, limits = Callback(live, scale=1.0), Limits(peak=1.0)
+    within, number = False, 0
+    while not within:
+        number += 1
+        callback.leaves[:] = np.nan
+        block = threading.Thread(target=callback.play_on, args=(number * 2_000_000,))
+        block.start()
+        while block.is_alive() and np.isnan(callback.leaves[0, 0]):
+            pass
+        callback.texture(number, limits)
+        within = block.is_alive()
+        block.join()
+    assert callback.log()["presentation"][-1] == 0
+    callback.play(1024)
+    assert callback.log()["presentation"][-1] == number
 
 
 @pytest.mark.parametrize("gain", [1.0, 1e6, 1e300])
