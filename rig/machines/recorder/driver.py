@@ -26,7 +26,6 @@ from tactileq.rig.shared.wire.link import Link
 
 LOOK_S = 0.05
 SLACK_S = 5.0  # beyond the patience of all phases
-ANSWER_S = 5.0  # of a busy computer; the recorder itself lets go after 0.1 s
 
 
 class RecorderWire(Protocol):
@@ -84,11 +83,11 @@ class LinkedWire:
 
     def read(self, name: str) -> Value:
         """See `RecorderWire`."""
-        return self._link.read(name, within_s=ANSWER_S)
+        return self._link.read(name)
 
     def write(self, name: str, value: Value) -> Value:
         """See `RecorderWire`."""
-        return self._link.write(name, value, within_s=ANSWER_S)
+        return self._link.write(name, value)
 
     def pause(self, seconds: float) -> None:
         """See `RecorderWire`."""

@@ -20,7 +20,7 @@ from tactileq.rig.shared.wire.transports import Transport, TransportLost
 
 KEEP_S = 0.025  # a device that is not spoken to for 0.1 s lets go
 BEAT_S = 0.1  # a heartbeat of the control loop is passed on so often at most
-COMMAND_S = 1.0
+COMMAND_S = 5.0  # of a busy computer; the device itself lets go after 0.1 s
 UPLOAD_S = 20.0
 AGAIN_S = 0.5  # between attempts to open it again
 _MOST_COMMANDS = 32
