@@ -219,15 +219,16 @@ class _Found(Noted):
             before = first.setdefault(tuple(own), path)
             if before == path:
                 continue
+            self.equal.append(f"{Path(before).name} and {Path(path).name}")
+            if path in alike:
+                continue
             every = whole if whole[path] == whole[before] else held
             places = [every[other] for other in held]
-            by_chance = expected_copies(places, list(held).index(path))
-            if path not in alike and by_chance < FEWEST_COPIES:
+            if expected_copies(places, list(held).index(path)) < FEWEST_COPIES:
                 raise InputError(
                     f"expected different answers in each file, got the same in {before} and "
                     f"{path}; leave one out, since a copy would count as another participant."
                 )
-            self.equal.append(f"{Path(before).name} and {Path(path).name}")
 
     def classes(self, rows: pd.DataFrame) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """The classes that were presented, and all with what else was answered."""

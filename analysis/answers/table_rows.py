@@ -5,7 +5,6 @@ docs/method/tables.md#what-is-read
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,12 +19,11 @@ from tactileq.analysis.answers.table_map import MEASURE_ROLES, OF_FILES, TableMa
 from tactileq.modeling import InputError
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import shown
-from tactileq.modeling.files.others.labels import Labels, is_no_name, same_label
+from tactileq.modeling.files.others.labels import Labels, is_no_name, same_label, without_zeros
 from tactileq.modeling.files.others.numbers import NO_NUMBER, PLAIN_STYLE
 from tactileq.modeling.files.others.table import OtherTable, same_name
 
 RIGHT = {"true": 1.0, "false": 0.0}
-_WHOLE = re.compile(r"([0-9]+)[.,]0{1,2}")  # three zeros may be thousands
 NO_ANSWER = frozenset({"na", "null", "."})  # what may be an answer of this name, or none
 
 Mask = npt.NDArray[np.bool_]
@@ -54,9 +52,7 @@ class Noted:
 
 def code_of(text: str) -> str:
     """What equal codes have in common: 1.0 is 1, TRUE is true."""
-    key = same_label(text)
-    whole = _WHOLE.fullmatch(key)
-    return whole[1] if whole else key
+    return without_zeros(same_label(text))
 
 
 def trials(table: OtherTable, mapping: TableMap, noted: Noted) -> pd.DataFrame:

@@ -36,6 +36,12 @@ def same_label(text: str) -> str:
     return " ".join(plain.casefold().split())
 
 
+def without_zeros(text: str) -> str:
+    """A whole number without zeros behind its sign, 1.0 as 1; any other text as it is."""
+    whole = _WHOLE.fullmatch(text)
+    return whole[1] if whole else text
+
+
 class Labels:
     """Names as they were spelt first: canvas and Canvas are one, 1.0 is 1."""
 
@@ -46,8 +52,7 @@ class Labels:
 
     def __call__(self, column: str, text: str) -> str:
         """The name by which a spelling goes."""
-        whole = _WHOLE.fullmatch(text)
-        name = whole[1] if whole else text
+        name = without_zeros(text)
         key = self._keys.setdefault(name, same_label(name))
         first = self._first.setdefault((column, key), unicodedata.normalize("NFC", name))
         if name != first and unicodedata.normalize("NFC", name) != first:
