@@ -19,6 +19,7 @@ from tactileq.modeling.errors import InputError, counted
 from tactileq.modeling.extras import Extra, MissingExtra, install_advice
 from tactileq.modeling.files.provenance import version_of
 from tactileq.modeling.rendering.compiled import is_compiled
+from tactileq.rig.desk.walls import largest_of
 from tactileq.rig.devices.hand.devices import connected_devices
 from tactileq.rig.devices.hand.sample import ConnectedDevice
 from tactileq.rig.devices.sound.devices import (
@@ -31,7 +32,7 @@ from tactileq.rig.devices.sound.devices import (
     sound_devices,
 )
 from tactileq.rig.machines.force.dhd import UNTESTED, DhdLibrary
-from tactileq.rig.machines.force.wall import largest_stiffness_n_per_mm
+from tactileq.rig.machines.force.wall import SLOWEST
 from tactileq.rig.shared.live.compiled import compiled
 from tactileq.rig.shared.setup.force_sections import DeviceSection, ForceSection
 from tactileq.rig.shared.setup.rig_file import SHIPPED_RIG_FILE, RigFile
@@ -197,12 +198,10 @@ def _limits(rig: RigFile) -> Finding:
 
 def _force(rig: RigFile, force: ForceSection) -> list[Finding]:
     """The force device and its library, and what a wall on it may be."""
-    largest = largest_stiffness_n_per_mm(
-        rate_hz=force.rate_hz,
-        damping_n_s_per_m=force.damping.value,
-        delay_s=1e-3 * force.delay_ms.value,
-    )
-    stable = f"passive up to {largest:.3g} N/mm"
+    stable = f"passive up to {largest_of(rig):.3g} N/mm"
+    if rig.own_device is None:
+        tolerated_ms = SLOWEST * 1e3 / force.rate_hz
+        stable += f" at periods of up to {tolerated_ms:g} ms on average, above which it lets go"
     if force.damping.assumed or force.delay_ms.assumed:
         stable += ", on assumed damping or delay"
     found = [Finding("wall", f"{stable}; force is commanded, not sensed", "note")]

@@ -20,6 +20,7 @@ from tactileq.rig.shared.live.memory import Live
 from tactileq.rig.shared.setup.rig_file import RigFile
 from tactileq.rig.shared.setup.sections import AccelerometerSection
 
+PROBE_N = 1.0  # after arming: a hand feels it, and encoders see what it moves
 SILENT_S = 0.06  # beyond three blocks: a wall is released where nothing was played for so long
 
 
@@ -150,6 +151,7 @@ def force_settings(rig: RigFile, *, sounds: bool = True, seed: int = 0) -> Force
         late_s=1e-3 * force.late_ms.value,
         frozen_s=1e-3 * force.frozen_ms.value,
         release_s=1e-3 * force.release_ms.value,
+        probe_n=min(PROBE_N, force.most_n.value / 2),
         low_mm=force.low_mm,
         high_mm=force.high_mm,
         pose=Pose()

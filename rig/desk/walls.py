@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from itertools import product
 
 from tactileq.modeling import InputError
-from tactileq.rig.machines.force.wall import Wall, largest_stiffness_n_per_mm
+from tactileq.rig.machines.force.wall import SLOWEST, Wall, largest_stiffness_n_per_mm
 from tactileq.rig.shared.setup.force_sections import ForceSection
 from tactileq.rig.shared.setup.rig_file import RigFile
 
@@ -52,7 +52,7 @@ def usual_wall(rig: RigFile) -> Wall:
         For a rig without a force device.
     """
     real = rig.real_surface
-    largest = largest_of(_force(rig))
+    largest = largest_of(rig)
     return Wall(
         height_mm=0.0 if real.offset_mm is None else real.offset_mm.value,
         stiffness_n_per_mm=(
@@ -63,10 +63,20 @@ def usual_wall(rig: RigFile) -> Wall:
     )
 
 
-def largest_of(force: ForceSection, *, wall_damping_n_s_per_m: float = 0.0) -> float:
-    """Stiffness (N/mm) up to which this device's walls are passive."""
+def largest_of(rig: RigFile, *, wall_damping_n_s_per_m: float = 0.0) -> float:
+    """Stiffness (N/mm) up to which this rig's walls are passive.
+
+    A servo lets go where its periods are more than SLOWEST nominal ones on average, and has to be
+    passive up to there; a device that renders by itself has a timer.
+
+    Raises
+    ------
+    InputError
+        For a rig without a force device.
+    """
+    force = _force(rig)
     return largest_stiffness_n_per_mm(
-        rate_hz=force.rate_hz,
+        rate_hz=force.rate_hz / (SLOWEST if rig.own_device is None else 1),
         damping_n_s_per_m=force.damping.value,
         delay_s=1e-3 * force.delay_ms.value,
         wall_damping_n_s_per_m=wall_damping_n_s_per_m,
@@ -90,7 +100,7 @@ def check_walls(rig: RigFile, walls: Walls, *, override: str | None = None) -> N
     for name, wall in walls.named().items():
         _check_within(rig, force, wall, name)
         if override is None:
-            _check_passive(force, wall, name)
+            _check_passive(rig, wall, name)
 
 
 def _force(rig: RigFile) -> ForceSection:
@@ -115,9 +125,10 @@ def _check_within(rig: RigFile, force: ForceSection, wall: Wall, name: str) -> N
                 )
 
 
-def _check_passive(force: ForceSection, wall: Wall, name: str) -> None:
+def _check_passive(rig: RigFile, wall: Wall, name: str) -> None:
     """Refuse a wall that is stiffer than is passive, and say how stiff it may be."""
-    largest = largest_of(force, wall_damping_n_s_per_m=wall.damping_n_s_per_m)
+    largest = largest_of(rig, wall_damping_n_s_per_m=wall.damping_n_s_per_m)
+    own = _force(rig).damping.value
     if wall.stiffness_n_per_mm <= largest:
         return
     raise InputError(
@@ -127,7 +138,7 @@ def _check_passive(force: ForceSection, wall: Wall, name: str) -> None:
             f"at most {_floored(largest):g} N/mm holds, or give --override with a reason, which is "
             "stored."
             if largest > 0
-            else f"its damper may have less than the device's own {force.damping.value:g} N·s/m."
+            else f"its damper may have less than the device's own {own:g} N·s/m."
         )
     )
 

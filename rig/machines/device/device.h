@@ -159,6 +159,7 @@ static inline void tq_device_limit(tq_device *d)
     l->origin_mm[2] = -50;
     for (n = 0; n < 3; n++)
         l->axes[4 * n] = 1;
+    l->probe_n = v->force_limit < 2 ? v->force_limit / 2 : 1;
     d->least_n = v->tension_range[0] > c->rewind_n ? v->tension_range[0] : c->rewind_n;
     if (d->least_n > v->current_limit * c->n_per_a + c->rewind_n)
         d->least_n = v->current_limit * c->n_per_a + c->rewind_n;
@@ -452,7 +453,7 @@ static inline void tq_device_vibrate(tq_device *d, int reads)
 {
     float sample = 0, most = d->values.vibration_limit;
     if (reads) {
-        float newton = d->force.normal_n > 0 ? (float)d->force.normal_n : 0;
+        float newton = (float)tq_force_felt(&d->force);
         d->values.speed = tq_device_speed(d);
         d->values.force = newton >= d->values.contact_force ? newton : 0;
         if (tq_device_renders(d))

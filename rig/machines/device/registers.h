@@ -10,7 +10,7 @@
 
 #define TQD_WHO_AM_I_VALUE 29012
 #define TQD_FIRMWARE_VERSION_VALUE 257
-#define TQD_SCHEMA_HASH_VALUE UINT64_C(0x47ec6215b790392c)
+#define TQD_SCHEMA_HASH_VALUE UINT64_C(0xea2a74165cf21d2e)
 
 /* Addresses. */
 enum {
@@ -121,6 +121,13 @@ enum {
     TQD_CAUSE_HOST = 15, /* another host, or the same one anew, said hello */
     TQD_CAUSE_STUCK = 16, /* one encoder stood still while the other one went on for 3 mm */
     TQD_CAUSE_SLACK = 17, /* a cable carried less than half of what it is to pull with for 20 ms, by the estimate from its motor */
+    TQD_CAUSE_SLOW = 18,
+    TQD_CAUSE_UNANSWERED = 19, /* after ARM the tool did not give way to a small force, or moved against it */
+    TQD_CAUSE_PRESSED_THROUGH = 20, /* deeper than 1.25 times where the wall's force is at ForceLimit, for 1 s */
+    TQD_CAUSE_FORCES_OFF = 21,
+    TQD_CAUSE_OFF_SWITCH = 22,
+    TQD_CAUSE_OFF_SPEED = 23,
+    TQD_CAUSE_OFF_WATCHDOG = 24,
 };
 
 /* What the vibrator plays. */

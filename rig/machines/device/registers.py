@@ -52,6 +52,13 @@ class DeviceCause(IntEnum):
     HOST = 15
     STUCK = 16
     SLACK = 17
+    SLOW = 18
+    UNANSWERED = 19
+    PRESSED_THROUGH = 20
+    FORCES_OFF = 21
+    OFF_SWITCH = 22
+    OFF_SPEED = 23
+    OFF_WATCHDOG = 24
 
 
 class DeviceSource(IntEnum):

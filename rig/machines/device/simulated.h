@@ -55,11 +55,13 @@ static inline int tq_simulated_write(tq_simulated *s, int output, tq_number valu
 }
 
 /* How hard the hand pushes the tool along x and z: towards a place that strokes. */
-static inline void tq_simulated_push(tq_simulated *s, const tqd_values *v, const tq_cables *c, tq_number push_n[2])
+static inline void tq_simulated_push(tq_simulated *s, const tq_device *d, tq_number push_n[2])
 {
+    const tqd_values *v = &d->values;
+    const tq_cables *c = &d->board.cables;
     const tq_mechanics *m = &s->mechanics;
     const tq_number step_s = (tq_number)1 / TQ_TICK_HZ, most_mm = TQ_LOWERS_MM_S * step_s;
-    int strokes = v->state == TQ_RUNNING || v->state == TQ_RELEASING;
+    int strokes = (v->state == TQ_RUNNING || v->state == TQ_RELEASING) && d->force.proven;
     tq_number turn = (tq_number)6.283185307179586 * (tq_number)v->stroke[1] * step_s;
     tq_number surface_mm = -50 - m->parts.surface_z_mm, goal_x, goal_z;
     /* At rest it bears what the pulleys' springs pull. */
@@ -79,11 +81,11 @@ static inline void tq_simulated_push(tq_simulated *s, const tqd_values *v, const
 }
 
 /* One tick of hand and mechanics. */
-static inline void tq_simulated_move(tq_simulated *s, const tqd_values *v, const tq_cables *c)
+static inline void tq_simulated_move(tq_simulated *s, const tq_device *d)
 {
     tq_number push_n[2];
-    tq_simulated_push(s, v, c, push_n);
-    tq_mechanics_tick(&s->mechanics, c, s->current_a, push_n, s->given[TQ_VIBRATOR]);
+    tq_simulated_push(s, d, push_n);
+    tq_mechanics_tick(&s->mechanics, &d->board.cables, s->current_a, push_n, s->given[TQ_VIBRATOR]);
 }
 
 /* Encoder counts of the motors, modulo 2^16, and what is wrong with them. */
@@ -145,7 +147,7 @@ static inline void tq_simulated_before(tq_simulated *s, tq_device *d, int ticks)
         tq_simulated_spoil(s, what);
     }
     for (; ticks; ticks--)
-        tq_simulated_move(s, &d->values, &d->board.cables);
+        tq_simulated_move(s, d);
     tq_simulated_count(s, &d->board.cables);
     tq_simulated_emerge(s, &d->values);
 }

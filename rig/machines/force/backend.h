@@ -1,6 +1,6 @@
 /* A back end: all that the servo of tactileq needs of a force device. docs/force-device.md#another-device
 
-   Write these two functions for another device, and a Python class that opens it, as dhd.py has one.
+   Write these three functions for another device, and a Python class that opens it, as dhd.py has one.
    They are called by one thread, one to four thousand times a second, and must neither allocate nor wait
    for longer than the device's own communication takes.
 
@@ -61,13 +61,16 @@ typedef struct {
     tq_number position_mm[3]; /* of the tool, in the device's own right-handed frame */
     int failed;
     int button; /* whether its button is down */
+    int off;    /* why the device itself has switched its forces off: a cause of force.h; 0 while they are on */
 } tq_sensed;
 
 typedef struct {
-    void *device; /* the back end's own; given to both functions */
+    void *device; /* the back end's own; given to all functions */
     void (*read)(void *device, tq_sensed *sensed);
     /* Push with this force (N, device's frame) from now on; not 0 where that failed. */
     int (*push)(void *device, const tq_number force_n[3]);
+    /* Let it push from now on, also after it has switched its forces off; `off` says whether it does. */
+    void (*enable)(void *device);
 } tq_backend;
 
 #endif

@@ -44,6 +44,11 @@ class Control:
         return self._figure(self._lib.TQ_WORD_TICK)
 
     @property
+    def longest_mean_s(self) -> float:
+        """Largest running mean of the servo's period since it began; 0 before."""
+        return self._figure(self._lib.TQ_WORD_PERIOD)
+
+    @property
     def depth_mm(self) -> float:
         """Of the tool below the wall's height; negative above."""
         return self._figure(self._lib.TQ_WORD_DEPTH)

@@ -27,7 +27,6 @@ _NAMES = {
     "darwin": ("libdhd.dylib", "libdrd.dylib"),
 }
 _LINUX = ("libdhd.so", "libdhd.so.3", "libdrd.so", "libdrd.so.3")
-_RESET = 3  # of a status: has to be homed first
 _WATCHDOG_STEP_S = 125e-6
 _DECLARED = """
 int dhdGetDeviceCount(void);
@@ -151,8 +150,9 @@ class DhdLibrary:
             )
         try:
             lib.dhdSetForce(0.0, 0.0, 0.0, one)
-            status = self._ffi.new("int[16]")
-            if homed and lib.dhdGetStatus(status, one) >= 0 and status[_RESET]:
+            own = compiled().lib
+            status = self._ffi.new("int[]", own.TQ_DHD_STATUS)
+            if homed and lib.dhdGetStatus(status, one) >= 0 and status[own.TQ_DHD_RESET]:
                 raise InputError(
                     "expected a force device that has been homed, got one that waits for it; home "
                     "it with the maker's program, then calibrate its pose again."
@@ -164,10 +164,9 @@ class DhdLibrary:
             lib.dhdStop(one)
             lib.dhdClose(one)
 
-    def enable(self, number: int, *, watchdog_s: float) -> bool:
-        """Let it push; whether its own watchdog is on."""
-        self._lib.dhdEnableForce(1, _char(number))
-        steps = min(255, max(1, round(watchdog_s / _WATCHDOG_STEP_S)))
+    def set_watchdog(self, number: int, *, seconds: float) -> bool:
+        """Have it switch its forces off after so long without a force; False where it cannot."""
+        steps = min(255, max(1, round(seconds / _WATCHDOG_STEP_S)))
         try:
             return int(self._lib.dhdSetWatchdog(steps, _char(number))) >= 0
         except AttributeError:  # of an older library
@@ -185,6 +184,8 @@ class DhdLibrary:
             ("get_position", "dhdGetPosition"),
             ("set_force", "dhdSetForce"),
             ("get_button", "dhdGetButton"),
+            ("get_status", "dhdGetStatus"),
+            ("enable_force", "dhdEnableForce"),
         ):
             address = int(self._ffi.cast("uintptr_t", self._ffi.addressof(self._lib, name)))
             kind = compiled().ffi.typeof(getattr(device, field))

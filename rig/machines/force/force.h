@@ -22,6 +22,9 @@ enum {
     TQ_HEARTBEAT_LOST, TQ_SOUND_LOST, TQ_WATCHDOG_LOST, TQ_NOT_WRITTEN, TQ_STOPPED,
     TQ_STOOD_STILL, /* by the watchdog: the servo itself */
     TQ_LINK_LOST, TQ_HOST_CHANGED, TQ_STUCK, TQ_SLACK, /* by a device that renders by itself */
+    TQ_SLOW, /* the running mean of the period is above what walls are passive for */
+    TQ_UNANSWERED, TQ_PRESSED_THROUGH,
+    TQ_OFF, TQ_OFF_SWITCH, TQ_OFF_SPEED, TQ_OFF_WATCHDOG, /* by the device itself, which has switched its forces off */
     TQ_CAUSES
 };
 
@@ -42,6 +45,17 @@ static inline int tq_force_next(int state, int event)
     return next[state][event];
 }
 
+/* The period for which walls have to be passive, in nominal ones; a running mean above it is a fault. */
+#define TQ_SLOWEST 2
+/* After ARM a small force tells whether the tool gives way to it: below the wall's limits, at a frequency that
+   is above what a hand does by itself and below what encoders do not resolve. docs/force-device.md#does-it-give-way */
+#define TQ_PROBE_S ((tq_number)0.4)
+#define TQ_PROBE_HZ ((tq_number)12.5)
+#define TQ_LEAST_ANSWER_MM ((tq_number)0.03)
+/* A wall that is pressed deeper than so many times where it has reached its limit, for so long, is none any more. */
+#define TQ_THROUGH ((tq_number)1.25)
+#define TQ_THROUGH_S ((tq_number)1)
+
 /* Limits of one device, and where its wall's frame lies. */
 typedef struct {
     tq_number late_s;       /* two readings further apart than this are a fault */
@@ -57,6 +71,8 @@ typedef struct {
     tq_number low_mm[3], high_mm[3]; /* workspace, in the device's frame */
     tq_number origin_mm[3];          /* of the wall's frame, in the device's */
     tq_number axes[9];               /* its unit vectors x, y and z (away from the surface) there */
+    tq_number period_s;              /* nominal, from one tick to the next; 0: nobody asks for their mean */
+    tq_number probe_n;               /* of the small force after ARM; 0: none */
 } tq_force_limits;
 
 /* A spring-damper wall: a rectangle about the origin of its frame, felt from above. */
@@ -79,10 +95,14 @@ typedef struct {
     tq_wall wall;
     tq_number scale;     /* how much of the wall is there, 0 to 1 */
     tq_number press_n;   /* pushes into the surface, to measure it */
-    tq_number frozen_s, fell_n;
+    tq_number frozen_s, fell_n, through_s;
+    tq_number mean_s;    /* running mean of the period, each counted by how long it is */
+    tq_number probe_s;   /* for how long the small force has gone; at its end the wall may come */
+    tq_number from_mm[3], sine[3], cosine[3], weight; /* where it began, and what answered it along each axis */
     tq_number raw_mm[3]; /* the last reading */
     int sensed;       /* whether there is one */
     int engaged;      /* whether the tool came onto the wall from above */
+    int proven;       /* whether the tool has given way to the small force */
     int off;          /* whoever holds the tool has switched the wall off */
 } tq_force;
 
@@ -104,6 +124,13 @@ static inline void tq_force_start(tq_force *f, const tq_force_limits *limits)
     f->limits = *limits;
 }
 
+/* A wall comes at once where that is not felt, else as a ramp; not from deep below. */
+static inline void tq_force_enter(tq_force *f)
+{
+    f->engaged = f->depth_mm * f->wall.stiffness_n_per_mm <= f->limits.most_n, f->frozen_s = 0;
+    f->scale = f->depth_mm <= 0 ? 1 : f->scale;
+}
+
 /* Takes an event; a cause counts with TQ_FAILED, and the first one is kept. */
 static inline void tq_force_event(tq_force *f, int event, int cause)
 {
@@ -115,10 +142,10 @@ static inline void tq_force_event(tq_force *f, int event, int cause)
         return;
     if (f->state == TQ_BOOT)
         f->cause = TQ_NO_CAUSE, f->sensed = 0;
-    if (f->state == TQ_RUNNING) { /* at once where that is not felt, else as a ramp; not from deep below */
-        f->engaged = f->depth_mm * f->wall.stiffness_n_per_mm <= f->limits.most_n, f->frozen_s = 0;
-        f->scale = f->depth_mm <= 0 ? 1 : f->scale;
-    }
+    if (before == TQ_IDLE)
+        f->probe_s = 0, f->proven = f->limits.probe_n <= 0;
+    if (f->state == TQ_RUNNING && f->proven)
+        tq_force_enter(f);
 }
 
 /* The wall from now on. Another one than before begins to be shown from nothing. */
@@ -126,6 +153,24 @@ static inline void tq_force_set_wall(tq_force *f, const tq_wall *wall)
 {
     f->wall = *wall, f->scale = 0;
     f->depth_mm = wall->height_mm - f->position_mm[2];
+}
+
+/* The running mean of the period, over as long as lets one reading of `late_s` pass, and 20 ms at least: a wall
+   that is held for a period T gives up to K v^2 T^2 / 2 to a hand of speed v, which b v^2 T takes away. With
+   periods that differ it is their mean, each weighted by its own length, that may not be above 2 b / K. */
+static inline void tq_force_average(tq_force *f, tq_number step_s)
+{
+    const tq_number period_s = f->limits.period_s, late_s = f->limits.late_s, shortest_s = (tq_number)0.02;
+    tq_number window_s;
+    if (period_s <= 0)
+        return;
+    if (!f->sensed) {
+        f->mean_s = period_s;
+    } else if (step_s > 0 && step_s <= late_s) {
+        window_s = late_s * (late_s - period_s) / period_s;
+        window_s = window_s > shortest_s ? window_s : shortest_s;
+        f->mean_s += step_s / (window_s + step_s) * (step_s - f->mean_s);
+    }
 }
 
 /* What is wrong with a reading that comes `step_s` after the one before; TQ_NO_CAUSE for nothing. */
@@ -180,13 +225,86 @@ static inline void tq_force_follow(tq_force *f, const tq_sensed *sensed, tq_numb
     f->sensed = 1;
 }
 
+/* A wave of size 1 that goes through 0 upwards at whole turns: parabolas, which need no library. */
+static inline tq_number tq_force_wave(tq_number turns)
+{
+    tq_number part = turns - (tq_number)tq_truncated(turns), half = (tq_number)0.5;
+    tq_number up = part < half ? part : part - half, size = 16 * up * (half - up);
+    return part < half ? size : -size;
+}
+
+/* Whether the tool moved as what has mass, damping and a soft hand does: along the force, behind it by 20 to 200
+   degrees. One whose encoders count backwards is ahead of that by half a turn; one that stands still, or goes
+   sideways, tells nothing. */
+static inline int tq_force_answered(const tq_force *f)
+{
+    tq_number along = f->sine[2] * f->sine[2] + f->cosine[2] * f->cosine[2], aside = 0, gives;
+    int n;
+    for (n = 0; n < 2; n++)
+        aside += f->sine[n] * f->sine[n] + f->cosine[n] * f->cosine[n];
+    gives = (tq_number)-0.34 * f->sine[2] - (tq_number)0.94 * f->cosine[2];
+    return gives >= TQ_LEAST_ANSWER_MM * f->weight && 16 * gives * gives >= along && aside <= along;
+}
+
+/* The small force after ARM: fades in and out, and sums what answers it. */
+static inline tq_number tq_force_probe(tq_force *f, tq_number step_s)
+{
+    const tq_number share = f->probe_s / TQ_PROBE_S, turns = TQ_PROBE_HZ * f->probe_s;
+    const tq_number fade = 16 * share * share * (1 - share) * (1 - share);
+    const tq_number sine = fade * tq_force_wave(turns), cosine = fade * tq_force_wave(turns + (tq_number)0.25);
+    int n;
+    if (f->probe_s == 0)
+        f->weight = 0;
+    for (n = 0; n < 3; n++) {
+        if (f->probe_s == 0)
+            f->from_mm[n] = f->position_mm[n], f->sine[n] = f->cosine[n] = 0;
+        f->sine[n] += sine * step_s * (f->position_mm[n] - f->from_mm[n]);
+        f->cosine[n] += cosine * step_s * (f->position_mm[n] - f->from_mm[n]);
+    }
+    f->weight += sine * sine * step_s;
+    f->probe_s += step_s;
+    return f->limits.probe_n * sine;
+}
+
+/* At the end of the small force: whether it is unanswered. */
+static inline int tq_force_unanswered(tq_force *f)
+{
+    if (f->proven || f->probe_s < TQ_PROBE_S)
+        return 0;
+    f->proven = tq_force_answered(f);
+    if (f->proven && f->state == TQ_RUNNING) /* asked for meanwhile */
+        tq_force_enter(f);
+    return !f->proven;
+}
+
+/* Whether the hand, or an encoder that counts backwards, has gone through the wall. */
+static inline int tq_force_through(tq_force *f, tq_number step_s)
+{
+    int through = f->state == TQ_RUNNING && f->engaged && f->scale >= 1
+                  && f->depth_mm * f->wall.stiffness_n_per_mm > TQ_THROUGH * f->limits.most_n;
+    f->through_s = through ? f->through_s + step_s : 0;
+    return f->through_s > TQ_THROUGH_S;
+}
+
+/* What of a device that pushes is wrong, though its reading is good; TQ_NO_CAUSE for nothing. */
+static inline int tq_force_pushes_wrong(tq_force *f, const tq_sensed *sensed, tq_number step_s)
+{
+    if (sensed->off)
+        return sensed->off;
+    if (f->mean_s > TQ_SLOWEST * f->limits.period_s)
+        return TQ_SLOW;
+    if (tq_force_unanswered(f))
+        return TQ_UNANSWERED;
+    return tq_force_through(f, step_s) ? TQ_PRESSED_THROUGH : TQ_NO_CAUSE;
+}
+
 /* Force of the wall, along z: never adhesive, none beyond its edge, and none for who came under it from
    beside it before having been above it. */
 static inline tq_number tq_wall_force(tq_force *f, tq_number step_s)
 {
     int inside = tq_force_size(f->position_mm[0]) <= f->wall.half_x_mm
                  && tq_force_size(f->position_mm[1]) <= f->wall.half_y_mm;
-    tq_number wanted = f->state == TQ_RUNNING && !f->off ? 1 : 0, most = step_s / f->limits.show_s, force;
+    tq_number wanted = f->state == TQ_RUNNING && !f->off && f->proven ? 1 : 0, most = step_s / f->limits.show_s, force;
     f->scale += tq_force_limited(wanted - f->scale, most);
     f->engaged = f->depth_mm <= 0 || (f->engaged && inside && !(f->off && f->scale <= 0));
     f->beyond = f->state == TQ_RUNNING && !f->off && f->depth_mm > 0 && !f->engaged;
@@ -213,14 +331,18 @@ static inline tq_number tq_force_clamped(const tq_force *f, tq_number force, tq_
 static inline void tq_force_tick(tq_force *f, const tq_sensed *sensed, tq_number step_s)
 {
     const tq_force_limits *l = &f->limits;
-    int wrong = tq_force_wrong(f, sensed, step_s), n;
+    int wrong, n;
     tq_number least_s = step_s > 0 ? (step_s < l->late_s ? step_s : l->late_s) : 0, force = 0, speed = 0;
+    tq_force_average(f, step_s);
+    wrong = tq_force_wrong(f, sensed, step_s);
     if (wrong == TQ_NO_CAUSE) {
         tq_force_follow(f, sensed, step_s);
         for (n = 0; n < 3; n++)
             speed += f->velocity_mm_s[n] * f->velocity_mm_s[n];
         if (speed > l->most_mm_s * l->most_mm_s)
             wrong = TQ_SPEED;
+        else if (f->state == TQ_ARMED || f->state == TQ_RUNNING)
+            wrong = tq_force_pushes_wrong(f, sensed, least_s);
     }
     tq_force_event(f, wrong == TQ_NO_CAUSE ? TQ_SENSED : TQ_FAILED, wrong);
     f->beyond = 0;
@@ -228,6 +350,8 @@ static inline void tq_force_tick(tq_force *f, const tq_sensed *sensed, tq_number
         force = tq_wall_force(f, least_s);
         if (f->state == TQ_RUNNING)
             force -= f->press_n;
+        if (!f->proven && f->probe_s < TQ_PROBE_S)
+            force += tq_force_probe(f, least_s);
         force = tq_force_clamped(f, force, least_s);
     } else if (f->state == TQ_RELEASING) { /* also without a reading: linearly to 0 */
         const tq_number shortest_s = (tq_number)1e-4;
@@ -241,6 +365,12 @@ static inline void tq_force_tick(tq_force *f, const tq_sensed *sensed, tq_number
         f->scale = f->press_n = 0, f->engaged = 0;
     for (n = 0; n < 3; n++)
         f->command_n[n] = force * l->axes[6 + n];
+}
+
+/* What the hand feels of a surface: the small force after ARM is none. */
+static inline tq_number tq_force_felt(const tq_force *f)
+{
+    return f->proven && f->normal_n > 0 ? f->normal_n : 0;
 }
 
 /* Up to which stiffness (N/mm) a wall that is sampled every `period_s` and answered `delay_s` later cannot

@@ -19,6 +19,8 @@ from tactileq.rig.shared.live.clock import check_clock, now_s, sleep
 from tactileq.rig.shared.live.memory import Live
 from tactileq.rig.shared.live.messages import Done
 
+PROBE_S = 0.45  # of the small force after arming, TQ_PROBE_S of force.h, and what follows it
+ENABLING_S = 0.01  # for a device to say that its forces are on
 START_ANEW_S = 2.0  # for a process that takes the place of another one
 _LOOK_S = 0.002
 
@@ -101,6 +103,7 @@ class ForceHand(HandReader):
             sleep(_LOOK_S)
         if self.status.state == State.IDLE:
             self._control.ask(Ask.ARM)
+            sleep(ENABLING_S + (PROBE_S if self._force.probe_n > 0 else 0.0))
         status = self.status
         if status.state not in (State.ARMED, State.RUNNING):
             raise InputError(

@@ -45,7 +45,7 @@ class _Servo(ServedServo):
     def _run_once(self) -> None:
         number = self._library.find(self._settings.serial)
         with self._library.opened(number) as name:
-            guarded = self._library.enable(number, watchdog_s=MISSED_S)
+            guarded = self._library.set_watchdog(number, seconds=MISSED_S)
             device = self._library.device(number)
             backend = compiled().lib.tq_dhd_backend(device)
             servo, _kept = prepared(self._live, backend, self._settings)
@@ -101,6 +101,8 @@ def limits_of(settings: ForceSettings) -> Any:
                 name: getattr(settings, name)
                 for name in ("late_s", "frozen_s", "release_s", "show_s", "most_n", "most_n_per_s")
             },
+            "period_s": 1 / settings.rate_hz,
+            "probe_n": settings.probe_n,
             "most_w": settings.most_w,
             "most_mm_s": settings.most_mm_s,
             "jump_mm": JUMP_MM,

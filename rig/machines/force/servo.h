@@ -16,6 +16,7 @@
 
 #define TQ_LOST_S 0.5      /* a device that has failed for so long is opened again */
 #define TQ_READING_S 0.001 /* between two readings in shared memory */
+#define TQ_ENABLING_S 0.003 /* after which a device that was enabled has to say that its forces are on */
 
 /* What the host asks of the servo. */
 enum { TQ_ASK_NOTHING, TQ_ASK_ARM, TQ_ASK_SHOW, TQ_ASK_HIDE, TQ_ASK_CLEAR, TQ_ASK_STOP };
@@ -37,7 +38,7 @@ struct tq_servo {
     tq_backend backend;
     tq_live *live;
     uint64_t asked, blocks; /* what was asked last, and how much had been played */
-    double shown_s, played_s, read_s, reported_s, failing_s;
+    double shown_s, played_s, read_s, reported_s, failing_s, enabled_s;
     int button, stopping;
 };
 typedef struct tq_servo tq_servo;
@@ -57,7 +58,8 @@ static inline void tq_servo_start(tq_servo *s, tq_live *live, tq_backend backend
     s->settings = *settings, s->live = live, s->backend = backend;
     s->asked = tq_word(live, TQ_WORD_ASKED); /* what was asked of an earlier servo is over */
     s->blocks = tq_blocks_written(live);
-    s->read_s = -1;
+    s->read_s = s->enabled_s = -1;
+    tq_put_figure(live, TQ_WORD_PERIOD, 0);
     tq_put_word(live, TQ_WORD_STATE, (s->asked << 16) | TQ_BOOT);
 }
 
@@ -83,6 +85,8 @@ static inline void tq_servo_obey(tq_servo *s, double now_s)
     s->asked = asked;
     switch (asked & 255) {
     case TQ_ASK_ARM:
+        if (s->force.state == TQ_IDLE)
+            s->backend.enable(s->backend.device), s->enabled_s = now_s;
         tq_force_event(&s->force, TQ_ARM, 0);
         break;
     case TQ_ASK_SHOW:
@@ -130,12 +134,14 @@ static inline void tq_servo_report(tq_servo *s, double now_s, int failed)
 {
     const tq_force *f = &s->force;
     uint32_t flags = TQ_FORCE_COMMANDED | (s->settings.simulated ? TQ_SIMULATED : 0);
-    double speed, newton = f->normal_n > 0 ? f->normal_n : 0;
+    double speed, newton = tq_force_felt(f);
     int n;
     tq_put_figure(s->live, TQ_WORD_TICK, now_s);
     for (n = 0; n < 3; n++)
         tq_put_figure(s->live, TQ_WORD_FORCE + n, f->command_n[n]);
     tq_put_figure(s->live, TQ_WORD_DEPTH, f->depth_mm);
+    if (f->mean_s > tq_figure(s->live, TQ_WORD_PERIOD))
+        tq_put_figure(s->live, TQ_WORD_PERIOD, f->mean_s);
     tq_put_word(s->live, TQ_WORD_TICKS, tq_word(s->live, TQ_WORD_TICKS) + 1);
     tq_put_word(s->live, TQ_WORD_STATE, (s->asked << 16) | (uint64_t)f->cause << 8 | (uint64_t)f->state);
     if (now_s < s->reported_s + TQ_READING_S * 0.9)
@@ -166,6 +172,8 @@ static inline int tq_servo_tick(tq_servo *s)
     s->read_s = now_s;
     tq_servo_obey(s, now_s);
     tq_servo_mind(s, now_s);
+    if (now_s - s->enabled_s < TQ_ENABLING_S)
+        sensed.off = TQ_NO_CAUSE;
     tq_force_tick(&s->force, &sensed, step_s);
     if (s->backend.push(s->backend.device, s->force.command_n)
         && (s->force.state == TQ_ARMED || s->force.state == TQ_RUNNING))

@@ -61,6 +61,8 @@ class ForceSettings:
         Of the tracking filter, which gives the speed of strokes.
     sound_s : float
         A wall is released where nothing was played for so long; 0 where nothing plays.
+    probe_n : float
+        Of the small force after arming, to which the tool has to give way; 0 for none.
     watched : bool
         Whether a watchdog has to look on.
     vibration : Vibration, optional
@@ -82,6 +84,7 @@ class ForceSettings:
     frozen_s: float = 0.25
     release_s: float = 0.05
     show_s: float = 0.2
+    probe_n: float = 0.0
     low_mm: Vector = (-100.0, -100.0, -100.0)
     high_mm: Vector = (100.0, 100.0, 100.0)
     pose: Pose = Pose()

@@ -4,8 +4,9 @@
 
    The device is a file in memory whose path stands in TACTILEQ_STANDIN: a mass with friction that a
    scripted hand holds with a spring and a damper, above a real surface on springs. It keeps the force that
-   it was given last, whoever has died meanwhile, unless its own watchdog is on. Faults are set in the
-   file. POSIX only.
+   it was given last, whoever has died meanwhile. Its force switch, its speed limit and its own watchdog
+   switch its forces off, and they stay off until they are enabled again, whatever it is told to push with:
+   so does the maker's. Faults are set in the file. POSIX only.
 
    Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
 
@@ -27,15 +28,18 @@ typedef struct {
     double resolution;                   /* of the encoders */
     double noise_n;                      /* of the hand, a pulse of this size up or down every 0.1 ms */
     /* Faults; counts are of readings from now on. */
-    int fail_reads, nan_reads, jump_reads, fail_pushes, freezes, button;
-    double stall_s, jump;
+    int fail_reads, nan_reads, jump_reads, fail_pushes, freezes, button, flipped;
+    int switched_off;    /* its force switch */
+    double stall_s, jump, most_m_s; /* its speed limit; 0: none */
     /* What happens. */
     double time_s, began_s, pushed_s;
     double position[3], velocity[3], force[3], shown[3];
     double most_n; /* largest force that it was given */
     uint64_t reads, pushes, seed;
-    int is_open, watchdog, force_off;
+    int is_open, watchdog, force_on, off_cause;
 } tq_standin;
+
+enum { TQ_STANDIN_BUTTON = 1, TQ_STANDIN_VELOCITY, TQ_STANDIN_WATCHDOG, TQ_STANDIN_SOFTWARE };
 
 /* A device as it is by default: an arm of 0.2 kg, in a hand that strokes. */
 static inline void tq_standin_start(tq_standin *d)
@@ -55,12 +59,27 @@ static inline size_t tq_standin_size(void)
     return sizeof(tq_standin);
 }
 
+/* Whether its own watchdog has heard of no force for too long. */
+static inline int tq_standin_unheard(const tq_standin *d, double now_s)
+{
+    return d->watchdog && now_s - d->pushed_s > 125e-6 * d->watchdog;
+}
+
 /* The force (N) along an axis that its motors give at a moment. */
 static inline double tq_standin_force(const tq_standin *d, double now_s, int axis)
 {
-    if (d->force_off || (d->watchdog && now_s - d->pushed_s > 125e-6 * d->watchdog))
-        return 0;
-    return d->force[axis];
+    return d->force_on && !d->switched_off && !tq_standin_unheard(d, now_s) ? d->force[axis] : 0;
+}
+
+/* Switches its forces off where it has to; the first cause stays. */
+static inline void tq_standin_look(tq_standin *d, double now_s)
+{
+    const double *v = d->velocity;
+    int cause = d->switched_off ? TQ_STANDIN_BUTTON : tq_standin_unheard(d, now_s) ? TQ_STANDIN_WATCHDOG : 0;
+    if (!cause && d->most_m_s > 0 && sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) > d->most_m_s)
+        cause = TQ_STANDIN_VELOCITY;
+    if (cause && d->force_on)
+        d->force_on = 0, d->off_cause = cause;
 }
 
 /* Its motion up to a moment, at most 50 ms of it. */
@@ -70,6 +89,7 @@ static inline void tq_standin_move(tq_standin *d, double now_s)
     int n;
     if (now_s - d->time_s > 0.05)
         d->time_s = now_s - 0.05;
+    tq_standin_look(d, now_s);
     for (; d->time_s + step_s <= now_s; d->time_s += step_s) {
         double phase = 6.283185307179586 * d->stroke_hz * (d->time_s - d->began_s);
         double turn = 6.283185307179586 * d->stroke_hz;
@@ -91,6 +111,7 @@ static inline void tq_standin_move(tq_standin *d, double now_s)
             d->velocity[n] += force / d->mass * step_s;
             d->position[n] += d->velocity[n] * step_s;
         }
+        tq_standin_look(d, d->time_s);
     }
 }
 
@@ -148,7 +169,7 @@ int dhdOpenID(char id)
         tq_the_error = "device already in use";
         return -1;
     }
-    d->is_open = 1, d->watchdog = 0;
+    d->is_open = 1, d->watchdog = 0, d->force_on = 0, d->off_cause = TQ_STANDIN_SOFTWARE;
     d->force[0] = d->force[1] = d->force[2] = 0;
     return id;
 }
@@ -170,6 +191,8 @@ int dhdStop(char id)
     if (!d)
         return -1;
     d->force[0] = d->force[1] = d->force[2] = 0, d->pushed_s = tq_now();
+    if (d->force_on)
+        d->force_on = 0, d->off_cause = TQ_STANDIN_SOFTWARE;
     return 0;
 }
 
@@ -185,19 +208,28 @@ int dhdGetSerialNumber(unsigned short *serial, char id)
     return 0;
 }
 
-int dhdGetStatus(int status[16], char id)
+/* 17 words, as a later library has. */
+int dhdGetStatus(int *status, char id)
 {
+    tq_standin *d = tq_the_device;
     (void)id;
-    memset(status, 0, 16 * sizeof *status);
+    tq_standin_move(d, tq_now());
+    memset(status, 0, 17 * sizeof *status);
     status[0] = status[1] = status[2] = 1; /* power, connected, started */
-    status[3] = tq_the_device->needs_home;
+    status[3] = d->needs_home;
+    status[5] = d->force_on, status[6] = !d->force_on; /* forces, else the brake */
+    status[14] = d->force_on ? 0 : d->off_cause;
+    status[16] = 1; /* axes checked */
     return 0;
 }
 
 int dhdEnableForce(unsigned char on, char id)
 {
+    tq_standin *d = tq_the_device;
     (void)id;
-    tq_the_device->force_off = !on;
+    d->pushed_s = tq_now();
+    d->force_on = on && !d->switched_off;
+    d->off_cause = d->switched_off ? TQ_STANDIN_BUTTON : TQ_STANDIN_SOFTWARE;
     return 0;
 }
 
@@ -241,7 +273,7 @@ int dhdGetPosition(double *x, double *y, double *z, char id)
     for (n = 0; n < 3; n++) {
         if (!d->freezes)
             d->shown[n] = d->resolution * floor(d->position[n] / d->resolution + 0.5);
-        *out[n] = d->nan_reads ? NAN : d->shown[n];
+        *out[n] = d->nan_reads ? NAN : n == 2 && d->flipped ? -d->shown[n] : d->shown[n];
     }
     if (d->jump_reads)
         *x += d->jump, d->jump_reads--;

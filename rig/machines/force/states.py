@@ -50,6 +50,13 @@ class Cause(IntEnum):
     HOST = 15
     STUCK = 16
     SLACK = 17
+    SLOW = 18
+    UNANSWERED = 19
+    PRESSED_THROUGH = 20
+    FORCES_OFF = 21
+    OFF_SWITCH = 22
+    OFF_SPEED = 23
+    OFF_WATCHDOG = 24
 
 
 class Ask(IntEnum):
@@ -93,6 +100,24 @@ SENTENCES = {
     "its cable.",
     Cause.SLACK: "expected both cables of the device to pull, got one that is slack; lift the tool "
     "more slowly, or check its cables.",
+    Cause.SLOW: "expected the servo of the force device to tick every 1/force.rate_hz, got more "
+    "than twice that on average; close other programs, allow real-time priority, or lower "
+    "force.rate_hz.",
+    Cause.UNANSWERED: "expected the tool to give way to a small force, got one that stood still or "
+    "moved against it; hold it loosely in the air, and if that does not help, check that its "
+    "encoders count the right way.",
+    Cause.PRESSED_THROUGH: "expected a hand that presses no harder than force.most_n, got a tool "
+    "that went through the wall for a second; press less hard, and if nobody did, check that "
+    "the device's encoders count the right way.",
+    Cause.FORCES_OFF: "expected the force device to have its forces on, got them off; see what its own "
+    "display says, and its power.",
+    Cause.OFF_SWITCH: "expected the force device to have its forces on, got them off by its force "
+    "switch; switch them on there.",
+    Cause.OFF_SPEED: "expected a tool slower than the force device's own limit, got a faster "
+    "one, upon which it has switched its forces off; move slower.",
+    Cause.OFF_WATCHDOG: "expected the force device to hear from this computer in time, got "
+    "silence, upon which its own watchdog has switched its forces off; close other programs, or "
+    "allow real-time priority.",
     Cause.STOPPED: "the force device was stopped.",
 }
 

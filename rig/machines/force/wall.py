@@ -9,6 +9,7 @@ from tactileq.modeling.checks import check_number
 
 STIFFEST_N_PER_MM = 20.0
 LARGEST_MM = 1000.0
+SLOWEST = 2  # nominal periods on average, above which a servo lets go: TQ_SLOWEST of force.h
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +56,8 @@ def largest_stiffness_n_per_mm(
     Parameters
     ----------
     rate_hz : float
-        Of the servo, above 0.
+        Ticks in a second, above 0; of periods that differ, one over their mean, each weighted by
+        its own length.
     damping_n_s_per_m : float
         Of the device itself (viscous), ≥ 0; what the hand adds is not counted.
     delay_s : float

@@ -58,6 +58,7 @@ enum {
     TQ_WORD_STATE,               /* what was asked last << 16 | cause << 8 | state */
     TQ_WORD_FORCE,               /* 3: command in the device's frame */
     TQ_WORD_DEPTH = TQ_WORD_FORCE + 3,
+    TQ_WORD_PERIOD,              /* largest running mean of the servo's period, s; force.h */
     TQ_WORD_WATCHDOG,            /* when the watchdog last looked */
     TQ_WORD_COUNT
 };

@@ -53,7 +53,7 @@ def rig_stiffness(
                 f"{press_n:g} N; lower --most."
             )
         found: list[Pressed] = []
-        limit = largest_of(loaded.force_device)
+        limit = largest_of(loaded)
         for place in ("Rest the tool on the real surface", "Hold the tool in the air above it"):
             _ask(place, loaded)
             wall = found[0].stiffness_n_per_mm if found else None

@@ -147,7 +147,7 @@ def test_states_and_causes_of_the_wire_are_those_of_the_servo() -> None:
 def test_what_a_rig_file_says_of_a_device_has_to_fit(tmp_path: Path) -> None:
     good = device_rig(tmp_path, "/dev/ttyACM0")
     assert good.simulated
-    assert largest_of(good.force_device) == pytest.approx(5 / 3)  # type: ignore[arg-type]
+    assert largest_of(good) == pytest.approx(5 / 3)
     with refused(InputError, expected="5000", got="1000"):
         device_rig(tmp_path, "/dev/ttyACM0", ("rate_hz = 5000", "rate_hz = 1000"))
     with refused(InputError, expected="[device]", got="force.library"):

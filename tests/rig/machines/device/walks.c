@@ -354,7 +354,7 @@ static int silences(long count)
     long n, shortest = 1000000, longest = 0;
     state_of_chance = 11;
     for (n = 0; n < count; n++) {
-        unsigned k, turns = 20 + below(60);
+        unsigned k, turns = 60 + below(60);
         long took;
         tq_virtual_start(v, (uint32_t)n, 0);
         tq_virtual_step(v, 1 + below(20));

@@ -108,6 +108,22 @@ def test_a_mass_comes_to_rest_below_the_bound_and_never_above(program: Path, del
     assert walks(program, "mass", 1.2, delay)["worst"] > 10
 
 
+def test_periods_within_what_is_tolerated_let_a_mass_rest_and_others_let_go(program: Path) -> None:
+    """At 0.8 of the bound, a mass of 0.2 kg; periods in ms, drawn evenly."""
+    for least, most, late in ((1, 1, 4), (0.5, 1.5, 4), (1, 2, 4), (1.99, 1.99, 4), (1, 2.5, 15)):
+        found = walks(program, "late", 0.8, least, most, late, 1)
+        assert (found["cause"], found["last"] < 0.001) == (Cause.NONE, True), (least, most)
+    for least, most, late in ((1, 4, 4), (1, 7, 15), (1, 15, 15), (2.1, 2.1, 4)):
+        found = walks(program, "late", 0.8, least, most, late, 1)
+        assert found["cause"] == Cause.SLOW
+        assert found["worst"] < 0.05  # it had not begun to swing
+    for late in (4, 8, 15, 19):  # each late one where it gives most energy
+        found = walks(program, "late", 0.8, 1, -1, late, 1)
+        assert (found["cause"], found["last"] < 0.001) == (Cause.NONE, True)
+        assert found["mean"] > 0.0019  # as often as is tolerated
+    assert walks(program, "late", 1.2, 1.99, 1.99, 4, 1)["last"] > 1  # the bound is no smaller
+
+
 @settings(max_examples=60, deadline=None)
 @given(
     rate_hz=st.floats(500, 4000),

@@ -167,6 +167,77 @@ def test_what_goes_wrong_with_the_device_lets_go_until_people_arm_it_again(
         pressed(device, live, hand)
 
 
+@pytest.mark.parametrize(
+    ("cause", "fault", "mended"),
+    [
+        (Cause.OFF_SWITCH, {"switched_off": 1}, {"switched_off": 0}),
+        (Cause.OFF_SPEED, {"most_m_s": 0.01}, {"most_m_s": 0.0}),
+        (Cause.FORCES_OFF, {"force_on": 0, "off_cause": 4}, {}),
+    ],
+)
+def test_a_device_that_switches_its_forces_off_is_a_fault_at_once_and_comes_back_as_a_ramp(
+    device: StandIn, cause: Cause, fault: dict[str, float], mended: dict[str, float]
+) -> None:
+    with opened() as (live, hand):
+        pressed(device, live, hand)
+        with taking_part():
+            begin_s = now_s()
+            for name, value in fault.items():
+                setattr(device.fields, name, value)
+            wait_until(lambda: hand.status.cause == cause, seconds=1, every_s=0.0005)
+            took_s = now_s() - begin_s
+        assert took_s < 0.005
+        wait_until(lambda: hand.status.state == State.FAULT)
+        assert hand.faults() == (hand.status.sentence,)
+        if mended and cause == Cause.OFF_SWITCH:  # not yet: it is not armed
+            assert refused(hand.arm) == hand.status.sentence
+        for name, value in mended.items():
+            setattr(device.fields, name, value)
+        first = live.readings_written
+        pressed(device, live, hand)
+        _, rows = live.readings_since(first)
+        wall = rows["force_n"][rows["force_n"] > 0]
+        assert wall[0] < SETTINGS.contact_n + 0.03  # 3 N in 0.2 s
+        assert np.abs(np.diff(wall)).max() < 0.1
+
+
+def test_a_hiccup_that_trips_the_devices_own_watchdog_is_a_fault_and_no_wall_without_force(
+    device: StandIn,
+) -> None:
+    """It switches its forces off, whatever it is told to push with, until they are enabled."""
+    device.fields.has_watchdog = 1
+    settings = ForceSettings(**{**vars(SETTINGS), "watched": False})
+    with opened(settings) as (live, hand):
+        pressed(device, live, hand)
+        device.fields.stall_s = 0.05
+        wait_until(lambda: hand.status.state == State.FAULT)
+        assert hand.status.cause in (Cause.LATE, Cause.OFF_WATCHDOG)
+        assert not device.fields.force_on
+        pressed(device, live, hand)  # what the motors give, not what was commanded
+        sleep(0.5)
+        live.heartbeat()
+        reading = live.latest()
+        assert reading is not None
+        assert size_n(device) == pytest.approx(reading["force_n"], abs=0.1)
+        # One that is too short for the servo to be late.
+        device.fields.watchdog = 80  # 10 ms
+        device.fields.stall_s = 0.015
+        wait_until(lambda: hand.status.state == State.FAULT)
+        assert hand.status.cause == Cause.OFF_WATCHDOG
+
+
+def test_a_tool_that_answers_the_wrong_way_or_not_at_all_is_not_armed(device: StandIn) -> None:
+    with opened(ForceSettings(**{**vars(SETTINGS), "probe_n": 1.0})) as (live, hand):
+        device.fields.flipped = 1
+        assert refused(hand.arm) == SENTENCES[Cause.UNANSWERED]
+        device.fields.flipped = 0
+        device.fields.mass = 50.0
+        assert refused(hand.arm) == SENTENCES[Cause.UNANSWERED]
+        device.fields.mass = 0.2
+        pressed(device, live, hand)
+        assert hand.faults() == ()
+
+
 def test_a_reading_that_stalls_for_five_milliseconds_is_late(device: StandIn) -> None:
     with opened(ForceSettings(**{**vars(SETTINGS), "late_s": 0.004})) as (_, hand):
         wait_until(lambda: hand.status.state == State.IDLE)

@@ -2,7 +2,9 @@
 
    walks faults SEED STEPS      random readings, faults and requests; prints what was broken
    walks strokes SEED COUNT FACTOR DELAY DAMPER   net energy of strokes on a wall of FACTOR times the bound
-   walks mass FACTOR DELAY      a mass with friction that rests on such a wall; prints how it ends */
+   walks mass FACTOR DELAY      a mass with friction that rests on such a wall; prints how it ends
+   walks late FACTOR LEAST MOST LATE SEED   the same, 0.2 kg, with periods from LEAST to MOST ms; -1 as MOST: a
+                                single one of LATE ms whenever the mass is fastest and the running mean lets it */
 
 #include "force.h"
 
@@ -22,7 +24,7 @@ static double chance(void)
 static tq_force_limits usual(void)
 {
     tq_force_limits l = { 0.004, 0.25, 0.05, 0.2, 5, 2000, 5, 1000, 2, 100, { -80, -80, -80 },
-                          { 80, 80, 80 }, { 0, 0, 0 }, { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
+                          { 80, 80, 80 }, { 0, 0, 0 }, { 1, 0, 0, 0, 1, 0, 0, 0, 1 }, 0.001, 0 };
     return l;
 }
 
@@ -213,6 +215,55 @@ static int mass(double factor, int delay)
     return 0;
 }
 
+/* A weight on a wall whose servo ticks at periods that differ: how far it swings in the end, and whether the servo
+   let go before it swung by 0.1 mm. */
+static int late(double factor, double least_ms, double most_ms, double late_ms, unsigned long long seed)
+{
+    const double T = 0.001, b = 0.0005, m = 0.0002, weight = 1, h = 5e-5;
+    tq_force_limits l = usual();
+    tq_force f;
+    tq_wall wall = { 0, factor * tq_largest_stiffness(b, 0, TQ_SLOWEST * T, 0), 0, 100, 100 };
+    tq_sensed s;
+    double z, v = 1, t = 0, worst = 0, last = 0, fell_s = -1, step_s = T, fastest = 0, rest, mean = 0;
+    state_of_chance = seed, rest = z = -weight / wall.stiffness_n_per_mm;
+    l.late_s = late_ms * 1e-3, l.frozen_s = 1e9, l.show_s = 1e-9;
+    memset(&s, 0, sizeof s);
+    tq_force_start(&f, &l);
+    tq_force_set_wall(&f, &wall);
+    s.position_mm[2] = 1;
+    tq_force_tick(&f, &s, T);
+    tq_force_event(&f, TQ_ARM, 0);
+    tq_force_event(&f, TQ_SHOW, 0);
+    f.sensed = 0; /* the mass is put onto the wall */
+    while (t < 20 && f.cause == TQ_NO_CAUSE) {
+        double force, until_s;
+        s.position_mm[2] = z;
+        tq_force_tick(&f, &s, step_s);
+        mean = f.mean_s > mean ? f.mean_s : mean;
+        force = f.normal_n;
+        step_s = 1e-3 * (least_ms + (most_ms - least_ms) * chance());
+        if (most_ms < 0) {
+            double window_s = l.late_s * (l.late_s - T) / T;
+            window_s = window_s > 0.02 ? window_s : 0.02;
+            fastest = fabs(v) > fastest ? fabs(v) : fastest * 0.999;
+            step_s = fabs(v) > 0.95 * fastest
+                     && f.mean_s + l.late_s / (window_s + l.late_s) * (l.late_s - f.mean_s) < TQ_SLOWEST * T
+                         ? l.late_s : T;
+        }
+        for (until_s = t + step_s; t < until_s - h / 2; t += h) {
+            v += (force - weight - b * v) / m * h;
+            z += v * h;
+            worst = fabs(z - rest) > worst ? fabs(z - rest) : worst;
+            if (t > 18)
+                last = fabs(z - rest) > last ? fabs(z - rest) : last;
+        }
+    }
+    if (f.cause != TQ_NO_CAUSE)
+        fell_s = t;
+    printf("worst %.6f last %.6f cause %d fell %.6f mean %.6f\n", worst, last, f.cause, fell_s, mean);
+    return 0;
+}
+
 int main(int count, char **words)
 {
     if (count > 3 && !strcmp(words[1], "faults"))
@@ -220,5 +271,7 @@ int main(int count, char **words)
     if (count > 6 && !strcmp(words[1], "strokes"))
         return strokes(strtoull(words[2], NULL, 10), atoi(words[3]), atof(words[4]), atoi(words[5]),
                        atof(words[6]));
+    if (count > 6 && !strcmp(words[1], "late"))
+        return late(atof(words[2]), atof(words[3]), atof(words[4]), atof(words[5]), strtoull(words[6], NULL, 10));
     return mass(atof(words[2]), atoi(words[3]));
 }
