@@ -151,6 +151,7 @@ def force_settings(rig: RigFile, *, sounds: bool = True, seed: int = 0) -> Force
         late_s=1e-3 * force.late_ms.value,
         frozen_s=1e-3 * force.frozen_ms.value,
         release_s=1e-3 * force.release_ms.value,
+        answer_s=1e-3 * force.delay_ms.value,
         probe_n=min(PROBE_N, force.most_n.value / 2),
         low_mm=force.low_mm,
         high_mm=force.high_mm,

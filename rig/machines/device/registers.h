@@ -123,7 +123,7 @@ enum {
     TQD_CAUSE_SLACK = 17, /* a cable carried less than half of what it is to pull with for 20 ms, by the estimate from its motor */
     TQD_CAUSE_SLOW = 18,
     TQD_CAUSE_UNANSWERED = 19, /* after ARM the tool did not give way to a small force, or moved against it */
-    TQD_CAUSE_PRESSED_THROUGH = 20, /* deeper than 1.25 times where the wall's force is at ForceLimit, for 1 s */
+    TQD_CAUSE_PRESSED_THROUGH = 20, /* deeper than where the wall's force is at ForceLimit, for 1 s */
     TQD_CAUSE_FORCES_OFF = 21,
     TQD_CAUSE_OFF_SWITCH = 22,
     TQD_CAUSE_OFF_SPEED = 23,

@@ -52,8 +52,7 @@ static inline int tq_force_next(int state, int event)
 #define TQ_PROBE_S ((tq_number)0.4)
 #define TQ_PROBE_HZ ((tq_number)12.5)
 #define TQ_LEAST_ANSWER_MM ((tq_number)0.03)
-/* A wall that is pressed deeper than so many times where it has reached its limit, for so long, is none any more. */
-#define TQ_THROUGH ((tq_number)1.25)
+/* A wall that is pressed deeper than where its force is at the limit, for so long, is none any more. */
 #define TQ_THROUGH_S ((tq_number)1)
 
 /* Limits of one device, and where its wall's frame lies. */
@@ -73,6 +72,7 @@ typedef struct {
     tq_number axes[9];               /* its unit vectors x, y and z (away from the surface) there */
     tq_number period_s;              /* nominal, from one tick to the next; 0: nobody asks for their mean */
     tq_number probe_n;               /* of the small force after ARM; 0: none */
+    tq_number answer_s;              /* from a reading to the force that answers it, about */
 } tq_force_limits;
 
 /* A spring-damper wall: a rectangle about the origin of its frame, felt from above. */
@@ -251,7 +251,8 @@ static inline tq_number tq_force_probe(tq_force *f, tq_number step_s)
 {
     const tq_number share = f->probe_s / TQ_PROBE_S, turns = TQ_PROBE_HZ * f->probe_s;
     const tq_number fade = 16 * share * share * (1 - share) * (1 - share);
-    const tq_number sine = fade * tq_force_wave(turns), cosine = fade * tq_force_wave(turns + (tq_number)0.25);
+    const tq_number came = turns + 1 - TQ_PROBE_HZ * f->limits.answer_s; /* the force comes that much later */
+    const tq_number sine = fade * tq_force_wave(came), cosine = fade * tq_force_wave(came + (tq_number)0.25);
     int n;
     if (f->probe_s == 0)
         f->weight = 0;
@@ -263,7 +264,7 @@ static inline tq_number tq_force_probe(tq_force *f, tq_number step_s)
     }
     f->weight += sine * sine * step_s;
     f->probe_s += step_s;
-    return f->limits.probe_n * sine;
+    return f->limits.probe_n * fade * tq_force_wave(turns);
 }
 
 /* At the end of the small force: whether it is unanswered. */
@@ -281,7 +282,7 @@ static inline int tq_force_unanswered(tq_force *f)
 static inline int tq_force_through(tq_force *f, tq_number step_s)
 {
     int through = f->state == TQ_RUNNING && f->engaged && f->scale >= 1
-                  && f->depth_mm * f->wall.stiffness_n_per_mm > TQ_THROUGH * f->limits.most_n;
+                  && f->depth_mm * f->wall.stiffness_n_per_mm > f->limits.most_n;
     f->through_s = through ? f->through_s + step_s : 0;
     return f->through_s > TQ_THROUGH_S;
 }

@@ -103,6 +103,7 @@ def limits_of(settings: ForceSettings) -> Any:
             },
             "period_s": 1 / settings.rate_hz,
             "probe_n": settings.probe_n,
+            "answer_s": settings.answer_s,
             "most_w": settings.most_w,
             "most_mm_s": settings.most_mm_s,
             "jump_mm": JUMP_MM,

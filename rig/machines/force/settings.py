@@ -63,6 +63,8 @@ class ForceSettings:
         A wall is released where nothing was played for so long; 0 where nothing plays.
     probe_n : float
         Of the small force after arming, to which the tool has to give way; 0 for none.
+    answer_s : float
+        From a reading to the force that answers it, 0 … 0.02.
     watched : bool
         Whether a watchdog has to look on.
     vibration : Vibration, optional
@@ -85,6 +87,7 @@ class ForceSettings:
     release_s: float = 0.05
     show_s: float = 0.2
     probe_n: float = 0.0
+    answer_s: float = 0.0
     low_mm: Vector = (-100.0, -100.0, -100.0)
     high_mm: Vector = (100.0, 100.0, 100.0)
     pose: Pose = Pose()

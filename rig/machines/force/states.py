@@ -109,8 +109,8 @@ SENTENCES = {
     Cause.PRESSED_THROUGH: "expected a hand that presses no harder than force.most_n, got a tool "
     "that went through the wall for a second; press less hard, and if nobody did, check that "
     "the device's encoders count the right way.",
-    Cause.FORCES_OFF: "expected the force device to have its forces on, got them off; see what its own "
-    "display says, and its power.",
+    Cause.FORCES_OFF: "expected the force device to have its forces on, got them off; see what its "
+    "own display says, and its power.",
     Cause.OFF_SWITCH: "expected the force device to have its forces on, got them off by its force "
     "switch; switch them on there.",
     Cause.OFF_SPEED: "expected a tool slower than the force device's own limit, got a faster "

@@ -66,6 +66,24 @@ def test_a_device_that_goes_wrong_lets_go_and_stays_so(what: DeviceSimulation) -
         assert told.value.status == DeviceStatus.STATE
 
 
+def test_encoders_that_count_backwards_are_let_go_before_and_under_a_wall() -> None:
+    talk = Talk()
+    talk.spoil(DeviceSimulation.FLIPPED)
+    for command in (DeviceCommand.HOME, DeviceCommand.ARM):
+        talk.ask(command)
+    talk.run(0.5)
+    assert (talk.state, talk.cause) == (DeviceState.FAULT, DeviceCause.UNANSWERED)
+    talk = Talk()
+    talk.write("FrozenTime", 5.0)
+    talk.write("Stroke", (0.0, 0.5, 16.0))
+    talk.push()
+    talk.spoil(DeviceSimulation.FLIPPED)
+    talk.write("Stroke", (0.0, 0.5, 15.0))  # a little less, and the wall pushes it out to the end
+    talk.run(2.5)
+    assert (talk.state, talk.cause) == (DeviceState.FAULT, DeviceCause.PRESSED_THROUGH)
+    assert talk.read("Current") == (0.0, 0.0)
+
+
 def test_counters_that_wrap_are_no_fault() -> None:
     """Both are 100 counts before their end where the tool rests, and pass it at once."""
     talk = Talk()

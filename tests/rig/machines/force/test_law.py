@@ -124,6 +124,34 @@ def test_periods_within_what_is_tolerated_let_a_mass_rest_and_others_let_go(prog
     assert walks(program, "late", 1.2, 1.99, 1.99, 4, 1)["last"] > 1  # the bound is no smaller
 
 
+def test_tools_that_answer_a_small_force_the_wrong_way_are_never_armed(program: Path) -> None:
+    """1000 tools, free and in hands that move, tremble and are soft or stiff."""
+    assert walks(program, "probe", 7, 1000, 1)["armed"] > 980
+    assert walks(program, "probe", 7, 1000, -1) == {"armed": 0, "unanswered": 1000}
+
+
+def test_a_wall_that_was_asked_for_before_the_small_force_has_ended_comes_after_it() -> None:
+    law = Law(ForceSettings(probe_n=1.0, frozen_s=9.0)).armed()
+    law.event(ForceEvent.SHOW)
+    answer = [0.5 * np.sin(2 * np.pi * 12.5 * n * TICK_S - 2.5) for n in range(402)]
+    forces = [law.tick((0, 0, -1 + z)) for z in answer]
+    assert min(forces[:390]) < -0.9  # around nothing: there is no wall yet
+    assert law.state == State.RUNNING
+    ramp = [law.tick((0, 0, -1.0)) for _ in range(250)]
+    assert max(np.diff(ramp)) < 2 * 1.5 * TICK_S / ForceSettings().show_s
+    assert ramp[-1] == pytest.approx(1.0)
+
+
+def test_a_tool_that_stays_below_a_wall_at_its_limit_is_let_go() -> None:
+    law = Law(ForceSettings(frozen_s=9.0)).running()
+    law.to((0, 0, -4.9), ticks=1500)  # of 5 N at most
+    assert law.state == State.RUNNING
+    law.to((0, 0, -5.2), ticks=400)
+    assert law.state == State.RUNNING
+    law.to((0, 0, -5.2), ticks=800)
+    assert law.cause == Cause.PRESSED_THROUGH
+
+
 @settings(max_examples=60, deadline=None)
 @given(
     rate_hz=st.floats(500, 4000),

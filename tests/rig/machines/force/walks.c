@@ -24,7 +24,7 @@ static double chance(void)
 static tq_force_limits usual(void)
 {
     tq_force_limits l = { 0.004, 0.25, 0.05, 0.2, 5, 2000, 5, 1000, 2, 100, { -80, -80, -80 },
-                          { 80, 80, 80 }, { 0, 0, 0 }, { 1, 0, 0, 0, 1, 0, 0, 0, 1 }, 0.001, 0 };
+                          { 80, 80, 80 }, { 0, 0, 0 }, { 1, 0, 0, 0, 1, 0, 0, 0, 1 }, 0.001, 0, 0 };
     return l;
 }
 
@@ -264,6 +264,47 @@ static int late(double factor, double least_ms, double most_ms, double late_ms, 
     return 0;
 }
 
+/* Tools of 0.05 to 0.5 kg, free or in hands that move up to 60 mm/s, with tremor, encoders of 0.005 to 0.08 mm and
+   forces that come 0 to 3 ms late: how many are let through after ARM. */
+static int probe(unsigned long long seed, int count, double sign)
+{
+    int n, armed = 0, unanswered = 0;
+    state_of_chance = seed;
+    for (n = 0; n < count; n++) {
+        const double T = 0.001, h = 1e-4, turn = 6.283185307179586;
+        const double m = 5e-5 * pow(10, chance()), b = 1e-4 * pow(20, chance()), count_mm = 0.005 * pow(16, chance());
+        const int held = chance() < 0.8, delay = (int)(4 * chance());
+        const double k = held ? 0.05 * pow(20, chance()) : 0, d = held ? 2e-3 * pow(10, chance()) : 0;
+        const double hz = 0.3 + 2 * chance(), size = 60 * chance() / (turn * hz), phase = turn * chance();
+        const double tremor = 0.05 * chance(), tremor_hz = 7 + 5 * chance(), tremor_phase = turn * chance();
+        double z = size * sin(phase) * held, v = 0, x = 0, given[4] = { 0, 0, 0, 0 };
+        tq_force_limits l = usual();
+        tq_force f;
+        tq_sensed s;
+        int tick, sub;
+        l.probe_n = 1, l.frozen_s = 1e9, l.answer_s = T * (delay + chance() - 0.5);
+        memset(&s, 0, sizeof s);
+        tq_force_start(&f, &l);
+        for (tick = 0; tick < 700; tick++) {
+            s.position_mm[0] = count_mm * floor(x / count_mm + 0.5);
+            s.position_mm[2] = 30 + sign * count_mm * floor(z / count_mm + 0.5);
+            tq_force_tick(&f, &s, T);
+            if (tick == 200)
+                tq_force_event(&f, TQ_ARM, 0);
+            given[tick % 4] = f.normal_n;
+            for (sub = 0; sub < 10; sub++) {
+                double t = T * tick + h * sub, goal = size * sin(turn * hz * t + phase)
+                       + tremor * sin(turn * tremor_hz * t + tremor_phase);
+                v += h / m * (given[(tick + 4 - delay) % 4] - b * v + k * (goal - z) - d * v);
+                z += h * v, x = 30 * sin(turn * 0.8 * t);
+            }
+        }
+        armed += f.state == TQ_ARMED && f.proven, unanswered += f.cause == TQ_UNANSWERED;
+    }
+    printf("armed %d unanswered %d\n", armed, unanswered);
+    return 0;
+}
+
 int main(int count, char **words)
 {
     if (count > 3 && !strcmp(words[1], "faults"))
@@ -273,5 +314,7 @@ int main(int count, char **words)
                        atof(words[6]));
     if (count > 6 && !strcmp(words[1], "late"))
         return late(atof(words[2]), atof(words[3]), atof(words[4]), atof(words[5]), strtoull(words[6], NULL, 10));
+    if (count > 4 && !strcmp(words[1], "probe"))
+        return probe(strtoull(words[2], NULL, 10), atoi(words[3]), atof(words[4]));
     return mass(atof(words[2]), atoi(words[3]));
 }
