@@ -9,7 +9,7 @@ import datetime
 import os
 import platform
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import starmap
 from math import log10
 from pathlib import Path
@@ -19,6 +19,7 @@ from tactileq.modeling.errors import InputError, counted
 from tactileq.modeling.extras import Extra, MissingExtra, install_advice
 from tactileq.modeling.files.provenance import version_of
 from tactileq.modeling.rendering.compiled import is_compiled
+from tactileq.rig.desk.parts import force_settings, hand_settings
 from tactileq.rig.desk.walls import largest_of
 from tactileq.rig.devices.hand.devices import connected_devices
 from tactileq.rig.devices.hand.sample import ConnectedDevice
@@ -32,8 +33,11 @@ from tactileq.rig.devices.sound.devices import (
     sound_devices,
 )
 from tactileq.rig.machines.force.dhd import UNTESTED, DhdLibrary
+from tactileq.rig.machines.force.hand import ForceHand
 from tactileq.rig.machines.force.wall import SLOWEST
+from tactileq.rig.shared.live.clock import sleep
 from tactileq.rig.shared.live.compiled import compiled
+from tactileq.rig.shared.live.memory import Live
 from tactileq.rig.shared.setup.force_sections import DeviceSection, ForceSection
 from tactileq.rig.shared.setup.rig_file import SHIPPED_RIG_FILE, RigFile
 
@@ -44,6 +48,7 @@ PACKAGES: dict[str, Extra | None] = {
     "psychopy": "console",
 }
 GROUPS = {"tablet": "input", "mouse": "input", "serial": "dialout"}  # who may read, on Debian
+SERVO_S = 0.5  # for which the servo of a force device runs without force
 OLD_DAYS = 90  # a study may ask for less
 _WITHOUT_PORTAUDIO = "not known without PortAudio"  # which is a separate fault, reported once
 
@@ -217,7 +222,36 @@ def _force(rig: RigFile, force: ForceSection) -> list[Finding]:
         return [Finding("force device", str(error), "fault"), *found]
     version = ".".join(map(str, library.version[:2]))
     tested = "simulated" if library.simulated else UNTESTED
-    return [Finding("force device", f"libdhd {version}: {tested}", "note"), *found]
+    return [
+        Finding("force device", f"libdhd {version}: {tested}", "note"),
+        _servo(rig, force),
+        *found,
+    ]
+
+
+def _servo(rig: RigFile, force: ForceSection) -> Finding:
+    """Which period the servo reaches; it runs for a while, without force."""
+    settings = force_settings(rig, sounds=False)
+    assert settings is not None
+    most_ms = SLOWEST * 1e3 / force.rate_hz
+    try:
+        with (
+            Live.create() as live,
+            ForceHand(live, hand_settings(rig), replace(settings, watched=False)) as hand,
+        ):
+            sleep(SERVO_S)
+            reached_ms = 1e3 * hand.control.longest_mean_s
+    except InputError as error:
+        return Finding("servo", str(error), "fault")
+    reached = f"a period of {reached_ms:.2f} ms on average at worst over {SERVO_S:g} s"
+    if reached_ms <= most_ms:
+        return Finding("servo", f"{reached}; above {most_ms:g} ms it lets go")
+    return Finding(
+        "servo",
+        f"expected at most {most_ms:g} ms, twice 1/force.rate_hz, got {reached}; close other "
+        "programs, allow real-time priority, or lower force.rate_hz.",
+        "fault",
+    )
 
 
 def _device(section: DeviceSection) -> Finding:

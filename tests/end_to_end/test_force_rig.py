@@ -58,7 +58,7 @@ def test_the_check_says_what_no_hardware_has_confirmed(
     force_rig(tmp_path)
     said = main("rig", "check").stdout
     assert "libdhd 3.17: simulated" in said
-    assert "passive up to 1.33 N/mm" in said
+    assert "passive up to 1 N/mm" in said
     # Under any other name the same library is taken for the maker's.
     text = (tmp_path / "rig.toml").read_text()
     (tmp_path / "path.toml").write_text(text.replace('"stand-in"', f'"{library_path()}"'))
@@ -226,7 +226,7 @@ def check_exposure(study: Path, events: Any) -> None:  # noqa: F811
 @pytest.mark.parametrize(
     ("wall", "told"),
     [
-        ("stiffness_n_per_mm = 3", "at most 1.333 N/mm holds"),
+        ("stiffness_n_per_mm = 3", "at most 1 N/mm holds"),
         ("height_mm = 150", "a corner at z = 150 mm"),
         ("width_mm = 300", "a corner at x = -150 mm"),
         ("damping_n_s_per_m = 5", "the device's own 2 N·s/m"),
