@@ -8,8 +8,9 @@ from __future__ import annotations
 import datetime
 import os
 import platform
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import starmap
 from math import log10
 from pathlib import Path
@@ -19,6 +20,7 @@ from tactileq.modeling.errors import InputError, counted
 from tactileq.modeling.extras import Extra, MissingExtra, install_advice
 from tactileq.modeling.files.provenance import version_of
 from tactileq.modeling.rendering.compiled import is_compiled
+from tactileq.rig.desk.checks import Requirements, refusals
 from tactileq.rig.devices.hand.devices import connected_devices
 from tactileq.rig.devices.hand.sample import ConnectedDevice
 from tactileq.rig.devices.sound.devices import (
@@ -35,6 +37,7 @@ from tactileq.rig.machines.force.wall import largest_stiffness_n_per_mm
 from tactileq.rig.shared.live.compiled import compiled
 from tactileq.rig.shared.setup.force_sections import DeviceSection, ForceSection
 from tactileq.rig.shared.setup.rig_file import SHIPPED_RIG_FILE, RigFile
+from tactileq.rig.shared.setup.sections import CALIBRATION_DAYS
 
 State = Literal["ok", "note", "fault"]
 PACKAGES: dict[str, Extra | None] = {
@@ -43,7 +46,6 @@ PACKAGES: dict[str, Extra | None] = {
     "psychopy": "console",
 }
 GROUPS = {"tablet": "input", "mouse": "input", "serial": "dialout"}  # who may read, on Debian
-OLD_DAYS = 90  # a study may ask for less
 _WITHOUT_PORTAUDIO = "not known without PortAudio"  # which is a separate fault, reported once
 
 
@@ -103,8 +105,20 @@ def connected_input() -> list[Finding]:
     return [_input_device(device) for device in connected_devices()]
 
 
-def of_rig(file: Path, *, today: datetime.date) -> tuple[RigFile | None, list[Finding]]:
-    """The rig file, and what of it is there: sound, hand, accelerometer, calibration, latency."""
+def of_rig(
+    file: Path,
+    *,
+    today: datetime.date,
+    refused_by: Callable[[RigFile], Mapping[str, str]] | None = None,
+) -> tuple[RigFile | None, list[Finding]]:
+    """The rig file, and what of it is there: sound, hand, accelerometer, calibration, latency.
+
+    Parameters
+    ----------
+    refused_by : callable, optional
+        Why sessions of a study refuse the rig, as `refusals`; by default of one that says nothing
+        of rigs.
+    """
     if not file.exists():
         sentence = (
             f"expected a rig file, got none; copy {SHIPPED_RIG_FILE} and adapt it to your rig."
@@ -130,7 +144,9 @@ def of_rig(file: Path, *, today: datetime.date) -> tuple[RigFile | None, list[Fi
             f"{len(assumed)} of {counted(len(rig.figures()), 'figure')} are assumed, see below"
         )
         found.append(Finding("figures", sentence, "note"))
-    return rig, found
+    refused = (refused_by or partial(refusals, requirements=Requirements(), today=today))(rig)
+    found = [one for one in found if one.state == "fault" or one.name not in refused]
+    return rig, [*found, *(Finding(*told, "fault") for told in refused.items())]
 
 
 def remedies(findings: Iterable[Finding]) -> list[str]:
@@ -286,16 +302,16 @@ def _accelerometer(rig: RigFile) -> Finding:
 def _calibration(rig: RigFile, today: datetime.date) -> Finding:
     done = rig.calibration
     if done is None or rig.vibrator.g_per_volt.assumed:
-        sentence = "never calibrated: levels are assumed (tactileq rig calibrate level)"
+        sentence = "levels are assumed (tactileq rig calibrate level)"
         return Finding("calibration", sentence, "note")
-    now, then = (rig.rig.name, set(rig.rig.serials)), (done.rig, set(done.serials))
-    if now != then:
+    aged = _aged("calibration", done.date, today)
+    if done.rests_on is None:
         sentence = (
-            f"expected the calibration of {rig.rig.name}, got that of {done.rig} with the serial "
-            f"numbers {', '.join(done.serials) or 'none'}; calibrate this one."
+            f"{aged.sentence}; it does not say what it rests on, so changes of the rig since then "
+            "go unnoticed (tactileq rig calibrate level)"
         )
-        return Finding("calibration", sentence, "fault")
-    return _aged("calibration", done.date, today)
+        return Finding("calibration", sentence, "note")
+    return aged
 
 
 def _latency(rig: RigFile, today: datetime.date) -> Finding:
@@ -312,4 +328,4 @@ def _latency(rig: RigFile, today: datetime.date) -> Finding:
 def _aged(what: str, day: datetime.date, today: datetime.date) -> Finding:
     days = (today - day).days
     ago = "today" if days == 0 else f"{days} days ago"
-    return Finding(what, f"{day.isoformat()}, {ago}", "note" if days > OLD_DAYS else "ok")
+    return Finding(what, f"{day.isoformat()}, {ago}", "note" if days > CALIBRATION_DAYS else "ok")
