@@ -109,7 +109,10 @@ def _vibrator(rig: RigFile, level_g: float | None, *, seed: int) -> None:
     )
     name = f"vibrator_{datetime.now():%Y%m%d_%H%M%S}.json"
     _write(rig, save_vibrator(rig, found, name))
-    print("note: now calibrate the level, which this result changes: until then nothing plays.")
+    print(
+        "note: now calibrate the level, which this result changes; one from before it no longer "
+        "fits, and nothing plays with it."
+    )
 
 
 def _level(
