@@ -76,7 +76,7 @@ def test_check_shows_what_is_there_and_why_it_is_not_enough(rig: Path, run: Run)
     done = run("rig", "check")
     assert done.returncode == 1, done.stdout + done.stderr
     assert refused_for(done) == ["calibration"]
-    assert f"{DEVICE} does 48000 Hz with 2 output channel(s)" in done.stdout
+    assert f"{DEVICE} does 48000 Hz with 2 output channel(s)" in " ".join(done.stdout.split())
     assert re.search(r"rig +calculated ", done.stdout)
     assert re.search(r"vibrator.g_per_volt +4 +g/V +assumed +a guess", done.stdout)
     calibrated(RigFile.load(rig))
@@ -86,7 +86,7 @@ def test_check_shows_what_is_there_and_why_it_is_not_enough(rig: Path, run: Run)
     rig.write_text(rig.read_text().replace(DEVICE, "no such card"))
     done = run("rig", "check")
     assert done.returncode == 1
-    assert refused_for(done) == ["sound", "accelerometer", "calibration"]
+    assert refused_for(done) == ["sound", "accelerometer"]
     assert "Traceback" not in done.stderr
 
 

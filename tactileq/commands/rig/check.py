@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tactileq.rig.desk.inventory import Finding
     from tactileq.rig.shared.setup.rig_file import RigFile
 
-_MARKS = {"ok": "", "note": "note", "fault": "missing"}
+_MARKS = {"ok": "", "note": "note", "fault": "fault"}
 _STYLES = {"ok": "", "note": "yellow", "fault": "bold red"}
 
 
