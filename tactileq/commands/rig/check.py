@@ -71,6 +71,7 @@ def rig_check(
         _show_figures(console, loaded)
     every = [finding for findings in parts.values() for finding in findings]
     faults = [finding for finding in every if finding.state == "fault"]
+    console.print(f"Judged by {_judged_by(study)}.", markup=False)
     for fault in faults:
         console.print(
             f"no study can run: {fault.name}: {fault.sentence}", style="red", markup=False
@@ -79,7 +80,6 @@ def rig_check(
         console.print(f"    {line}", markup=False, soft_wrap=True)
     if faults:
         raise typer.Exit(1)
-    console.print(f"Judged by {_judged_by(study)}.", markup=False)
     console.print("A study can run on this rig.")
 
 
