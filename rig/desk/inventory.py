@@ -87,7 +87,7 @@ def _package(name: str, extra: Extra | None) -> Finding:
 
 
 def connected_sound() -> list[Finding]:
-    """All sound devices: channels, usual rate."""
+    """All sound devices: channels, usual rate. Whether a rig needs one is said with the rig."""
     try:
         devices = sound_devices()
     except (NoPortAudio, MissingExtra):
@@ -96,7 +96,7 @@ def connected_sound() -> list[Finding]:
         return [Finding("sound", str(error), "fault")]
     if not devices:
         sentence = "expected a sound device, got none; connect one, or start the sound server."
-        return [Finding("sound", sentence, "fault")]
+        return [Finding("sound", sentence, "note")]
     return [Finding(device.name, _described(device)) for device in devices]
 
 
@@ -223,7 +223,7 @@ def _force(rig: RigFile, force: ForceSection) -> list[Finding]:
         stable += ", on assumed damping or delay"
     found = [Finding("wall", f"{stable}; force is commanded, not sensed", "note")]
     if rig.own_device is not None:
-        return [_device(rig.own_device), *found]
+        return [_device(rig, rig.own_device), *found]
     if rig.pose is None:
         sentence = "expected a measured pose, got none; measure it (tactileq rig pose)."
         found.append(Finding("pose", sentence, "note"))
@@ -237,12 +237,16 @@ def _force(rig: RigFile, force: ForceSection) -> list[Finding]:
     return [Finding("force device", f"libdhd {version}: {tested}", "note"), *found]
 
 
-def _device(section: DeviceSection) -> Finding:
+def _device(rig: RigFile, section: DeviceSection) -> Finding:
     """What the device says of itself; saying hello lets go what another program had armed."""
     try:
-        from tactileq.rig.machines.device.asking import asked  # needs the extra rig
+        # They need the extra rig.
+        from tactileq.rig.machines.device.asking import asked
+        from tactileq.rig.machines.device.sound import check_reach
 
         found = asked(section.address, section.baud)
+        if section.renders:
+            check_reach(found.reach, rig.safe_limits, scale=rig.fullscale_per_g)
     except InputError as error:
         return Finding("force device", str(error), "fault")
     if found.simulated and not section.simulated:

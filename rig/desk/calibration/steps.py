@@ -184,9 +184,15 @@ def latency_figures(
 
 
 def save_vibrator(rig: RigFile, vibrator: Vibrator, name: str) -> dict[str, object]:
-    """Write what was identified beside the rig file; gives what names it there."""
+    """Write what was identified beside the rig file; gives what names it there.
+
+    An older calibration then says of which vibrator it is.
+    """
     write_text(rig.path.parent / name, vibrator.to_json())
-    return {"vibrator.file": name}
+    named: dict[str, object] = {"vibrator.file": name}
+    if rig.calibration is not None and rig.calibration.rests_on is None:
+        named["calibration.rests_on"] = [f"vibrator.file = {rig.level_basis['vibrator.file']}"]
+    return named
 
 
 def _note(rig: RigFile) -> str:

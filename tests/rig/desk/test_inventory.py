@@ -133,10 +133,17 @@ def test_without_psychopy_the_rig_is_checked_all_the_same(monkeypatch: pytest.Mo
     check_refusal(found["psychopy"].sentence, expected="psychopy", got="tactileq[console]")
 
 
-def test_no_card_at_all_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_card_at_all_is_a_note_and_the_fault_is_that_of_a_rig_that_needs_one(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def none(*_: object, **of: object) -> Any:
+        raise InputError("expected a sound device for output, got none; connect one.")
+
     monkeypatch.setattr(inventory, "sound_devices", list)
+    monkeypatch.setattr(inventory, "find_device", none)
     (finding,) = connected_sound()
-    assert finding.state == "fault"
+    assert finding.state == "note"
+    assert faults(found(rig_file(tmp_path).path)) == {"sound"}
 
 
 def connect(monkeypatch: pytest.MonkeyPatch, *devices: ConnectedDevice) -> None:

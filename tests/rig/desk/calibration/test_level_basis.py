@@ -167,6 +167,15 @@ def test_a_level_before_the_vibrator_has_to_be_measured_again_and_is_then_right(
     np.testing.assert_allclose(gain(rig), 1.0, rtol=0.02)
 
 
+def test_a_vibrator_that_is_identified_ends_an_older_calibration_too(tmp_path: Path) -> None:
+    rig = rig_file(tmp_path)
+    assert rig.calibration is not None
+    assert rig.calibration.rests_on is None
+    named = save_vibrator(rig, planted_vibrator(), "vibrator.json")
+    with refused(InputError, expected=["vibrator.file", "none"], got="SHA-256"):
+        RigFile.updated(rig.path, named).check_calibration()
+
+
 @pytest.fixture
 def stale(tmp_path: Path) -> RigFile:
     rig = calibrated(rig_file(tmp_path, ("[latency]", ACCELEROMETER)))
