@@ -197,7 +197,12 @@ RIG = Kind(
                 "p95_ms": figure(15, "ms"),
                 "measured_on": DAY,
             },
-            "calibration": {"date": DAY, "rig": "desk rig", "serials": ["V1"]},
+            "calibration": {
+                "date": DAY,
+                "rig": "desk rig",
+                "serials": ["V1"],
+                "rests_on": ["sound.fullscale_v = 4 V"],
+            },
             "real_surface": {
                 "hand_measured": True,
                 "offset_mm": figure(80, "mm"),

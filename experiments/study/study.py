@@ -29,12 +29,12 @@ from tactileq.modeling.files.described import DescribedFile, FileSection, key
 from tactileq.modeling.files.hashes import sha256_of_values
 from tactileq.modeling.files.kinds import Label, ListedLabel, is_different, is_label, is_line
 from tactileq.modeling.reprs import one_line
+from tactileq.rig.shared.setup.sections import CALIBRATION_DAYS
 
 # Their order is part of every seed: new ones go to the end.
 TASKS = tuple(dict.fromkeys(("absolute", "relative", "oddity", "threshold", *ANSWER_TABLES)))
 MOST_TEXTURES = 12
 MOST_MODELS = 6
-CALIBRATION_DAYS = 90.0
 LONGEST_GAP_MIN = 30.0
 # Fewer people say too little about the spread between people, on which the model's rule rests.
 FEWEST_OF_MODEL = 8

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from datetime import date
 
 from tactileq.modeling import InputError
@@ -12,14 +12,20 @@ from tactileq.modeling.models.ar_model import ARModel
 from tactileq.modeling.models.loading import AnyModel
 from tactileq.modeling.rendering.lattice import lattice_fields
 from tactileq.modeling.rendering.plan import plan_for
+from tactileq.rig.desk.parts import vibration_output
+from tactileq.rig.desk.stimuli import check_stimulus
+from tactileq.rig.desk.walls import Walls, check_walls, usual_wall
+from tactileq.rig.shared.interface import Presentable, Stimulus
+from tactileq.rig.shared.live.memory import Live
 from tactileq.rig.shared.setup.rig_file import RigFile
+from tactileq.rig.shared.setup.sections import CALIBRATION_DAYS
 
 HIGHEST_LATENCY_MS = 40.0  # textures are felt to change there (Okamoto and others 2009)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Requirements:
-    """What a study requires of a rig.
+    """What a study requires of a rig; by default what one does that says nothing of it.
 
     Parameters
     ----------
@@ -29,34 +35,102 @@ class Requirements:
         Whether the force must be measured.
     """
 
-    calibration_days: float
-    measured_force: bool
+    calibration_days: float = CALIBRATION_DAYS
+    measured_force: bool = False
 
 
 def check_rig(
-    rig: RigFile, requirements: Requirements | None, *, today: date, override: str | None = None
+    rig: RigFile,
+    requirements: Requirements | None,
+    *,
+    today: date,
+    override: str | None = None,
+    walls: Walls | None = None,
 ) -> None:
-    """Refuse a rig that is too slow, or that is not what a study requires.
+    """Refuse a rig that no session can use, or that is not what a study requires.
 
     Parameters
     ----------
     requirements : Requirements, optional
-        Without them only the latency is checked.
+        Without them neither the age of the calibration nor the hand is checked.
     today : date
     override : str, optional
-        Reason to use it although its latency is too long.
+        Reason to use it although its latency is too long, or a wall too stiff to be passive.
+    walls : Walls, optional
+        Of a force device; without it the usual one.
 
     Raises
     ------
     InputError
-        For a p95 of the latency above 40 ms without an override; for no calibration, one of another
-        rig, or an older one than allowed; for an assumed force where it must be measured; for a
-        window's pointer as the hand in a study.
+        For a p95 of the latency above 40 ms without an override; for no calibration, one that does
+        not fit this rig, or an older one than allowed; for an assumed force where it must be
+        measured; for a window's pointer as the hand in a study; for limits that the card cannot
+        play; for a wall that the device cannot render.
     """
-    _check_latency(rig, override)
+    for check in _checks(rig, requirements, today=today, override=override, walls=walls).values():
+        check()
+
+
+def refusals(
+    rig: RigFile,
+    requirements: Requirements,
+    *,
+    today: date,
+    walls: Walls | None = None,
+    presented: Iterable[Presentable] = (),
+) -> dict[str, str]:
+    """Why sessions refuse a rig, all that `check_rig` and `check_models` say, by what it is about.
+
+    Empty for a rig that they accept. Needs no device.
+    """
+    checks = _checks(rig, requirements, today=today, override=None, walls=walls)
+    checks["models"] = lambda: check_models(_uncalibrated(rig), presented)
+    refused = {}
+    for name, check in checks.items():
+        try:
+            check()
+        except InputError as error:
+            refused[name] = str(error)
+    return refused
+
+
+def _checks(
+    rig: RigFile,
+    requirements: Requirements | None,
+    *,
+    today: date,
+    override: str | None,
+    walls: Walls | None,
+) -> dict[str, Callable[[], None]]:
+    return {
+        "latency": lambda: _check_latency(rig, override),
+        "calibration": lambda: _check_calibration(rig, requirements, today),
+        "hand": lambda: _check_hand(rig, requirements),
+        "output": lambda: _check_output(rig),
+        "wall": lambda: _check_walls(rig, walls, override),
+    }
+
+
+def _uncalibrated(rig: RigFile) -> RigFile:
+    """As it is without its calibration, which is another question."""
+    return replace(rig, calibration=None)
+
+
+def _check_output(rig: RigFile) -> None:
+    with Live.create() as live:
+        vibration_output(_uncalibrated(rig), live)
+
+
+def _check_walls(rig: RigFile, walls: Walls | None, override: str | None) -> None:
+    if walls is None and rig.force_device is not None:
+        walls = Walls(usual=usual_wall(rig))
+    if walls is not None:
+        check_walls(rig, walls, override=override)
+
+
+def _check_hand(rig: RigFile, requirements: Requirements | None) -> None:
     if requirements is None:
         return
-    _check_calibration(rig, requirements, today)
     if rig.hand.kind == "window":
         raise InputError(
             f'expected a hand with a device of its own in a study, got kind = "window" under [hand]'
@@ -70,17 +144,20 @@ def check_rig(
         )
 
 
-def check_models(rig: RigFile, models: Iterable[AnyModel]) -> None:
-    """Refuse models that a rig cannot play, or not at their level and rate.
+def check_models(rig: RigFile, models: Iterable[Presentable]) -> None:
+    """Refuse models and stimuli that a rig cannot play, or not at their level and rate.
 
     Raises
     ------
     InputError
-        For one that is not in g, or of a higher rate than the card's; for an AR model that
+        For a model that is not in g, or of a higher rate than the card's; for an AR model that
         `lattice_fields` refuses. Where a device renders it, as
-        `tactileq.rig.machines.device.models.device_model`.
+        `tactileq.rig.machines.device.models.device_model`. For a stimulus as `check_stimulus`.
     """
     for model in models:
+        if isinstance(model, Stimulus):
+            check_stimulus(rig, model)
+            continue
         if model.unit != "g":
             raise InputError(
                 f"expected models in g for the rig in {rig.path}, got {model.texture} in unit "
@@ -117,22 +194,16 @@ def _check_latency(rig: RigFile, override: str | None) -> None:
         )
 
 
-def _check_calibration(rig: RigFile, requirements: Requirements, today: date) -> None:
-    calibration, again = rig.calibration, "calibrate it (tactileq rig calibrate)"
+def _check_calibration(rig: RigFile, requirements: Requirements | None, today: date) -> None:
+    rig.check_calibration()
+    if requirements is None:
+        return
+    calibration, again = rig.calibration, "calibrate it (tactileq rig calibrate level)"
     if calibration is None:
         raise InputError(f"expected a calibrated rig, got no [calibration] in {rig.path}; {again}.")
-    if calibration.rig != rig.rig.name or set(calibration.serials) != set(rig.rig.serials):
-        raise InputError(
-            f"expected a calibration of {_named(rig.rig.name, rig.rig.serials)} in {rig.path}, got "
-            f"that of {_named(calibration.rig, calibration.serials)}; {again}."
-        )
     age = (today - calibration.date).days
     if not 0 <= age <= requirements.calibration_days:
         raise InputError(
             f"expected a calibration of the last {requirements.calibration_days:g} days in "
             f"{rig.path}, as the study requires, got one of {calibration.date}; {again}."
         )
-
-
-def _named(name: str, serials: tuple[str, ...]) -> str:
-    return f"the rig {shown(name)}" + (f" ({', '.join(sorted(serials))})" if serials else "")

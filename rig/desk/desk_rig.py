@@ -24,7 +24,7 @@ from tactileq.rig.desk.lock import rig_locked
 from tactileq.rig.desk.parts import hand_reader, vibration_output
 from tactileq.rig.desk.pen import Pen
 from tactileq.rig.desk.stimuli import check_made_for, check_stimulus
-from tactileq.rig.desk.walls import Walls, check_walls, usual_wall
+from tactileq.rig.desk.walls import Walls, usual_wall
 from tactileq.rig.devices.hand.reader import HandReader
 from tactileq.rig.devices.sound.signals import tone_burst
 from tactileq.rig.devices.sound.supervision import SoundLost
@@ -71,7 +71,7 @@ class DeskRig:
     Parameters
     ----------
     requirements : Requirements, optional
-        Those of the study; without them neither calibration nor force are checked.
+        Those of the study; without them neither the calibration's age nor the hand is checked.
     override : str, optional
         Reason to use it although its latency is too long, or a wall too stiff to be passive.
     seed : int
@@ -83,8 +83,7 @@ class DeskRig:
     Raises
     ------
     InputError
-        If the study requires another rig, its latency is too long, or its device cannot render a
-        wall.
+        As `check_rig`.
     """
 
     def __init__(
@@ -96,11 +95,9 @@ class DeskRig:
         seed: int = 0,
         walls: Walls | None = None,
     ) -> None:
-        check_rig(rig_file, requirements, today=date.today(), override=override)
         if rig_file.force_device is not None and walls is None:
             walls = Walls(usual=usual_wall(rig_file))
-        if walls is not None:
-            check_walls(rig_file, walls, override=override)
+        check_rig(rig_file, requirements, today=date.today(), override=override, walls=walls)
         self._walls = walls
         self._file = rig_file
         self._override = override

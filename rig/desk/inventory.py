@@ -8,8 +8,9 @@ from __future__ import annotations
 import datetime
 import os
 import platform
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import starmap
 from math import log10
 from pathlib import Path
@@ -19,6 +20,7 @@ from tactileq.modeling.errors import InputError, counted
 from tactileq.modeling.extras import Extra, MissingExtra, install_advice
 from tactileq.modeling.files.provenance import version_of
 from tactileq.modeling.rendering.compiled import is_compiled
+from tactileq.rig.desk.checks import Requirements, refusals
 from tactileq.rig.desk.parts import force_settings, hand_settings
 from tactileq.rig.desk.walls import largest_of
 from tactileq.rig.devices.hand.devices import connected_devices
@@ -40,6 +42,7 @@ from tactileq.rig.shared.live.compiled import compiled
 from tactileq.rig.shared.live.memory import Live
 from tactileq.rig.shared.setup.force_sections import DeviceSection, ForceSection
 from tactileq.rig.shared.setup.rig_file import SHIPPED_RIG_FILE, RigFile
+from tactileq.rig.shared.setup.sections import CALIBRATION_DAYS
 
 State = Literal["ok", "note", "fault"]
 PACKAGES: dict[str, Extra | None] = {
@@ -49,7 +52,6 @@ PACKAGES: dict[str, Extra | None] = {
 }
 GROUPS = {"tablet": "input", "mouse": "input", "serial": "dialout"}  # who may read, on Debian
 SERVO_S = 0.5  # for which the servo of a force device runs without force
-OLD_DAYS = 90  # a study may ask for less
 _WITHOUT_PORTAUDIO = "not known without PortAudio"  # which is a separate fault, reported once
 
 
@@ -91,7 +93,7 @@ def _package(name: str, extra: Extra | None) -> Finding:
 
 
 def connected_sound() -> list[Finding]:
-    """All sound devices: channels, usual rate."""
+    """All sound devices: channels, usual rate. Whether a rig needs one is said with the rig."""
     try:
         devices = sound_devices()
     except (NoPortAudio, MissingExtra):
@@ -100,7 +102,7 @@ def connected_sound() -> list[Finding]:
         return [Finding("sound", str(error), "fault")]
     if not devices:
         sentence = "expected a sound device, got none; connect one, or start the sound server."
-        return [Finding("sound", sentence, "fault")]
+        return [Finding("sound", sentence, "note")]
     return [Finding(device.name, _described(device)) for device in devices]
 
 
@@ -109,8 +111,20 @@ def connected_input() -> list[Finding]:
     return [_input_device(device) for device in connected_devices()]
 
 
-def of_rig(file: Path, *, today: datetime.date) -> tuple[RigFile | None, list[Finding]]:
-    """The rig file, and what of it is there: sound, hand, accelerometer, calibration, latency."""
+def of_rig(
+    file: Path,
+    *,
+    today: datetime.date,
+    refused_by: Callable[[RigFile], Mapping[str, str]] | None = None,
+) -> tuple[RigFile | None, list[Finding]]:
+    """The rig file, and what of it is there: sound, hand, accelerometer, calibration, latency.
+
+    Parameters
+    ----------
+    refused_by : callable, optional
+        Why sessions of a study refuse the rig, as `refusals`; by default of one that says nothing
+        of rigs.
+    """
     if not file.exists():
         sentence = (
             f"expected a rig file, got none; copy {SHIPPED_RIG_FILE} and adapt it to your rig."
@@ -136,7 +150,9 @@ def of_rig(file: Path, *, today: datetime.date) -> tuple[RigFile | None, list[Fi
             f"{len(assumed)} of {counted(len(rig.figures()), 'figure')} are assumed, see below"
         )
         found.append(Finding("figures", sentence, "note"))
-    return rig, found
+    refused = (refused_by or partial(refusals, requirements=Requirements(), today=today))(rig)
+    found = [one for one in found if one.state == "fault" or one.name not in refused]
+    return rig, [*found, *(Finding(*told, "fault") for told in refused.items())]
 
 
 def remedies(findings: Iterable[Finding]) -> list[str]:
@@ -211,7 +227,7 @@ def _force(rig: RigFile, force: ForceSection) -> list[Finding]:
         stable += ", on assumed damping or delay"
     found = [Finding("wall", f"{stable}; force is commanded, not sensed", "note")]
     if rig.own_device is not None:
-        return [_device(rig.own_device), *found]
+        return [_device(rig, rig.own_device), *found]
     if rig.pose is None:
         sentence = "expected a measured pose, got none; measure it (tactileq rig pose)."
         found.append(Finding("pose", sentence, "note"))
@@ -254,12 +270,16 @@ def _servo(rig: RigFile, force: ForceSection) -> Finding:
     )
 
 
-def _device(section: DeviceSection) -> Finding:
+def _device(rig: RigFile, section: DeviceSection) -> Finding:
     """What the device says of itself; saying hello lets go what another program had armed."""
     try:
-        from tactileq.rig.machines.device.asking import asked  # needs the extra rig
+        # They need the extra rig.
+        from tactileq.rig.machines.device.asking import asked
+        from tactileq.rig.machines.device.sound import check_reach
 
         found = asked(section.address, section.baud)
+        if section.renders:
+            check_reach(found.reach, rig.safe_limits, scale=rig.fullscale_per_g)
     except InputError as error:
         return Finding("force device", str(error), "fault")
     if found.simulated and not section.simulated:
@@ -319,16 +339,16 @@ def _accelerometer(rig: RigFile) -> Finding:
 def _calibration(rig: RigFile, today: datetime.date) -> Finding:
     done = rig.calibration
     if done is None or rig.vibrator.g_per_volt.assumed:
-        sentence = "never calibrated: levels are assumed (tactileq rig calibrate level)"
+        sentence = "levels are assumed (tactileq rig calibrate level)"
         return Finding("calibration", sentence, "note")
-    now, then = (rig.rig.name, set(rig.rig.serials)), (done.rig, set(done.serials))
-    if now != then:
+    aged = _aged("calibration", done.date, today)
+    if done.rests_on is None:
         sentence = (
-            f"expected the calibration of {rig.rig.name}, got that of {done.rig} with the serial "
-            f"numbers {', '.join(done.serials) or 'none'}; calibrate this one."
+            f"{aged.sentence}; it does not say what it rests on, so changes of the rig since then "
+            "go unnoticed (tactileq rig calibrate level)"
         )
-        return Finding("calibration", sentence, "fault")
-    return _aged("calibration", done.date, today)
+        return Finding("calibration", sentence, "note")
+    return aged
 
 
 def _latency(rig: RigFile, today: datetime.date) -> Finding:
@@ -345,4 +365,4 @@ def _latency(rig: RigFile, today: datetime.date) -> Finding:
 def _aged(what: str, day: datetime.date, today: datetime.date) -> Finding:
     days = (today - day).days
     ago = "today" if days == 0 else f"{days} days ago"
-    return Finding(what, f"{day.isoformat()}, {ago}", "note" if days > OLD_DAYS else "ok")
+    return Finding(what, f"{day.isoformat()}, {ago}", "note" if days > CALIBRATION_DAYS else "ok")

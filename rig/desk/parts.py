@@ -38,9 +38,10 @@ def vibration_output(
     Raises
     ------
     InputError
-        For limits beyond what the card can play, or a vibrator that cannot be compensated at its
-        rate.
+        For limits beyond what the card can play, a vibrator that cannot be compensated at its rate,
+        or a calibration that no longer fits (`RigFile.check_calibration`).
     """
+    rig.check_calibration()
     if rig.renderer is None:
         return sound_output(rig, live, seed=seed)
     from tactileq.rig.machines.device.hand import DeviceHand  # needs the extra rig

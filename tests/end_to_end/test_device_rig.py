@@ -91,6 +91,13 @@ def test_it_is_watched_and_played_by_commands(main: Any, tmp_path: Path, device:
     rendering_rig(tmp_path, device.address)
     said = " ".join(main("rig", "check").stdout.split())
     assert "the device renders the texture" in said
+    assert "A study can run on this rig." in said
+    (tmp_path / "weak").mkdir()
+    rendering_rig(
+        tmp_path / "weak", device.address, ('= 2.0, unit = "V/g"', '= 0.0001, unit = "V/g"')
+    )
+    said = " ".join(main("rig", "check", "--rig", "weak/rig.toml").stdout.split())
+    assert "no study can run: force device: expected a peak limit of at most" in said
     played = main("rig", "play", "--rig", "rig.toml", "--tone", "200", "--duration", "0.3")
     assert played.returncode == 0, played.stderr
     planted_texture("canvas").save(tmp_path / "canvas.json")

@@ -24,6 +24,7 @@ from tactileq.rig.shared.setup.rig_file import RigFile
 from tactileq.stimuli.planted.textures import planted_texture
 from tests.modeling.rendering.lattices import planted_ar
 from tests.rig.desk.calibration.card import rig_file
+from tests.rig.desk.rig_files import calibrated
 
 Jack = Callable[..., AbstractContextManager[Any]]
 Run = Callable[..., subprocess.CompletedProcess[str]]
@@ -66,18 +67,26 @@ def measured(done: subprocess.CompletedProcess[str], file: Path, before: str) ->
     return False
 
 
+def refused_for(done: subprocess.CompletedProcess[str]) -> list[str]:
+    lines = [line for line in done.stdout.splitlines() if line.startswith("no study can run:")]
+    return [line.split(":")[1].strip() for line in lines]
+
+
 def test_check_shows_what_is_there_and_why_it_is_not_enough(rig: Path, run: Run) -> None:
     done = run("rig", "check")
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert f"{DEVICE} does 48000 Hz with 2 output channel(s)" in done.stdout
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert refused_for(done) == ["calibration"]
+    assert f"{DEVICE} does 48000 Hz with 2 output channel(s)" in " ".join(done.stdout.split())
     assert re.search(r"rig +calculated ", done.stdout)
     assert re.search(r"vibrator.g_per_volt +4 +g/V +assumed +a guess", done.stdout)
+    calibrated(RigFile.load(rig))
+    done = run("rig", "check")
+    assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.rstrip().endswith("A study can run on this rig.")
     rig.write_text(rig.read_text().replace(DEVICE, "no such card"))
     done = run("rig", "check")
     assert done.returncode == 1
-    lines = [line for line in done.stdout.splitlines() if line.startswith("no study can run:")]
-    assert [line.split(":")[1].strip() for line in lines] == ["sound", "accelerometer"]
+    assert refused_for(done) == ["sound", "accelerometer"]
     assert "Traceback" not in done.stderr
 
 
@@ -138,7 +147,7 @@ def test_a_twin_runs_with_its_rig_file_until_ctrl_c(
         assert twin.stdout is not None
         assert "Ctrl-C ends it" in twin.stdout.readline()
         done = run("rig", "check")
-        assert done.returncode == 0, done.stdout + done.stderr
+        assert refused_for(done) == ["calibration"], done.stdout + done.stderr
         assert "simulated rig (simulated)" in done.stdout
         again = run("rig", "twin")
         assert "error: expected a new rig file, got rig.toml, which exists" in again.stderr

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import datetime
 import time
+from dataclasses import replace
 
 import numpy as np
 
@@ -138,19 +139,15 @@ def level_figures(
         f"{band_hz[1]:g} Hz, {level.placements} placements, spread {level.spread_db:.1f} dB, mean "
         f"within {within_db:.1f} dB (95 %){_note(rig)}"
     )
+    found = Figure(old * level.gain, "g/V", False, source)
+    basis = replace(rig, vibrator=replace(rig.vibrator, g_per_volt=found)).level_basis
     return {
-        "vibrator.g_per_volt": Figure(old * level.gain, "g/V", False, source),
+        "vibrator.g_per_volt": found,
         "vibrator.measured_on": today,
-        **stamp(rig, today),
-    }
-
-
-def stamp(rig: RigFile, today: datetime.date) -> dict[str, object]:
-    """When, and of which rig."""
-    return {
         "calibration.date": today,
         "calibration.rig": rig.rig.name,
         "calibration.serials": list(rig.rig.serials),
+        "calibration.rests_on": [f"{name} = {value}" for name, value in basis.items()],
     }
 
 
@@ -187,9 +184,15 @@ def latency_figures(
 
 
 def save_vibrator(rig: RigFile, vibrator: Vibrator, name: str) -> dict[str, object]:
-    """Write what was identified beside the rig file; gives what names it there."""
+    """Write what was identified beside the rig file; gives what names it there.
+
+    An older calibration then says of which vibrator it is.
+    """
     write_text(rig.path.parent / name, vibrator.to_json())
-    return {"vibrator.file": name}
+    named: dict[str, object] = {"vibrator.file": name}
+    if rig.calibration is not None and rig.calibration.rests_on is None:
+        named["calibration.rests_on"] = [f"vibrator.file = {rig.level_basis['vibrator.file']}"]
+    return named
 
 
 def _note(rig: RigFile) -> str:

@@ -12,6 +12,7 @@ from tactileq.rig.shared.wire.definition import Definition, Value
 from tactileq.rig.shared.wire.transports import TransportLost, opened_transport
 
 STATED = ("Simulated", "State", "Cause")
+RANGES = ("VibrationRange",)
 COUNTED = ("Tick", "ModelHash", "Number", "FramesBad", "RecordsLost")
 
 
@@ -45,6 +46,13 @@ class Asked:
         return f"state {self._named('State')}, last cause {self._named('Cause')}"
 
     @property
+    def reach(self) -> float:
+        """What the vibrator's converter takes at most, in its own unit."""
+        most = self.values["VibrationRange"]
+        assert isinstance(most, float)
+        return most
+
+    @property
     def counts(self) -> dict[str, Value]:
         """Its counters by name, as many as it has."""
         return {name: self.values[name] for name in COUNTED if name in self.values}
@@ -76,7 +84,7 @@ def asked(address: str, baud: int, definitions: Sequence[Definition] = (DEVICE,)
             except InputError as error:
                 refused = error
                 continue
-            names = [name for name in (*STATED, *COUNTED) if name in definition.registers]
+            names = [name for name in (*STATED, *RANGES, *COUNTED) if name in definition.registers]
             return Asked(definition, hello, {name: talk.read(name) for name in names})
         raise refused
     except TransportLost as lost:

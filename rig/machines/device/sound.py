@@ -89,11 +89,7 @@ class DeviceSound(VibrationOutput):
             if self._opens:
                 stack.enter_context(self._hand)
             most = self._lost(lambda: self._hand.ask(Describe())).most_g
-            if self._limits.peak * self._scale > most:
-                raise InputError(
-                    f"expected a peak limit of at most {most / self._scale:.4g} g, which is full "
-                    f"scale of the device, got {self._limits.peak:g} g; lower it in the rig file."
-                )
+            check_reach(most, self._limits, scale=self._scale)
             self._played.begin()
             self._stack = stack.pop_all()
 
@@ -211,3 +207,12 @@ class DeviceSound(VibrationOutput):
             raise SoundLost(
                 f"expected a device that plays, got: {lost}; check it (tactileq rig check)."
             ) from None
+
+
+def check_reach(most: float, limits: Limits, *, scale: float) -> None:
+    """Refuse limits that a converter which takes so much cannot give, `scale` being 1 g."""
+    if limits.peak * scale > most:
+        raise InputError(
+            f"expected a peak limit of at most {most / scale:.4g} g, which is full scale of the "
+            f"device, got {limits.peak:g} g; lower it in the rig file."
+        )

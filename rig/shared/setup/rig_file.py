@@ -10,14 +10,14 @@ from __future__ import annotations
 import datetime
 import hashlib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isclose
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
-from tactileq.modeling.errors import InputError
+from tactileq.modeling.errors import InputError, shown
 from tactileq.modeling.files.described import BESIDE, DescribedFile, keys_of, naming
 from tactileq.modeling.files.documents import read_toml
 from tactileq.modeling.files.hashes import sha256_of_values
@@ -43,6 +43,7 @@ from tactileq.rig.shared.setup.sections import (
 
 DEVICE_RATE_HZ = 5000.0  # of the control loop of [device]
 DEVICE_BLOCK_S = 0.01  # between looks at what it has played
+SHORT_SHA256 = 12  # digits that tell two vibrators apart
 SHIPPED_RIG_FILE = Path(__file__).with_name("desk_rig.toml")
 
 
@@ -215,6 +216,71 @@ class RigFile(DescribedFile):
         return 1 / (self.output_v.value * self.vibrator.g_per_volt.value)
 
     @property
+    def level_basis(self) -> dict[str, str]:
+        """What g at the held pen rests on: keys and their values, of a file its content.
+
+        That is what plays, what it drives, and what the level is measured with.
+        """
+        device, sound, sensor = self.renderer, self.sound, self.accelerometer
+        basis: dict[str, object] = {"device.renders": device is not None}
+        if device is None:
+            basis |= {
+                "sound.device": sound.device,
+                "sound.rate_hz": sound.rate_hz,
+                "sound.vibration_channel": sound.vibration_channel,
+                "sound.fullscale_v": sound.fullscale_v,
+                "sound.simulated": sound.simulated,
+            }
+        else:
+            basis |= {
+                "device.address": device.address,
+                "device.volts_per_g": device.volts_per_g,
+                "device.simulated": device.simulated,
+            }
+        sha256 = None if self.identified is None else self.identified.sha256
+        basis |= {
+            "vibrator.file": sha256 and f"SHA-256 {sha256[:SHORT_SHA256]}",
+            "vibrator.g_per_volt": self.vibrator.g_per_volt,
+        }
+        if sensor is not None:
+            basis |= {
+                "accelerometer.device": sensor.device,
+                "accelerometer.channel": sensor.channel,
+                "accelerometer.g_per_fullscale": sensor.g_per_fullscale,
+            }
+        return {name: _in_words(value) for name, value in basis.items()}
+
+    def check_calibration(self) -> None:
+        """Refuse a calibration that is not that of this rig as it is now; none is no claim.
+
+        Raises
+        ------
+        InputError
+            For another rig's name or serial numbers, and for another value of what the level rests
+            on.
+        """
+        done = self.calibration
+        if done is None:
+            return
+        if done.rig != self.rig.name or set(done.serials) != set(self.rig.serials):
+            raise InputError(
+                f"expected a calibration of {_named(self.rig.name, self.rig.serials)} in "
+                f"{self.path}, got that of {_named(done.rig, done.serials)}; calibrate it "
+                "(tactileq rig calibrate level)."
+            )
+        then = dict(line.partition(" = ")[::2] for line in done.rests_on or ())
+        now = self.level_basis
+        if self.accelerometer is None:  # it may go once the level is known
+            now |= {name: was for name, was in then.items() if name.startswith("accelerometer.")}
+        changed = [name for name, was in then.items() if now.get(name) != was]
+        if changed:
+            raise InputError(
+                f"expected {_listed(changed, then)} in {self.path}, as when the level was "
+                f"calibrated, got {_listed(changed, now)}; calibrate the level again (tactileq rig "
+                "calibrate level), or undo the change."
+            )
+
+    @property
     def renderer(self) -> DeviceSection | None:
         """[device] where it renders the texture; None where the sound card does."""
         device = self.own_device
@@ -281,3 +347,20 @@ def _given(value: Any) -> Any:
     if isinstance(value, dict):
         return {name: _given(one) for name, one in value.items() if one is not None}
     return value.isoformat() if isinstance(value, datetime.date) else value
+
+
+def _in_words(value: object) -> str:
+    """As a line of [calibration] says it; digits beyond the ninth are no other level."""
+    if isinstance(value, Figure):
+        return f"{value.value:.9g} {value.unit}"
+    if isinstance(value, bool) or value is None:
+        return {True: "true", False: "false", None: "none"}[value]
+    return f"{value:.9g}" if isinstance(value, float) else str(value)
+
+
+def _listed(names: Sequence[str], values: Mapping[str, str]) -> str:
+    return ", ".join(f"{name} = {values.get(name, 'none')}" for name in names)
+
+
+def _named(name: str, serials: Sequence[str]) -> str:
+    return f"the rig {shown(name)}" + (f" ({', '.join(sorted(serials))})" if serials else "")

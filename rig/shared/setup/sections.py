@@ -12,6 +12,7 @@ from tactileq.modeling.files.kinds import Name, Rate
 from tactileq.rig.shared.setup.figures import Curve, Figure
 
 LOUDEST_MASKING = 0.5
+CALIBRATION_DAYS = 90.0  # how old a calibration may be where no study says otherwise
 HandKind = Literal["tablet", "mouse", "serial", "window", "scripted", "force"]
 _WITHOUT_FORCE = ("mouse", "window")
 _LEAST = 1e-6  # far below any rig's, and far above what a division by it could not hold
@@ -299,6 +300,16 @@ class CalibrationSection(FileSection):
     date: Annotated[datetime.date, key("when")]
     rig: Annotated[Name, key("name of the rig at that time")]
     serials: Annotated[tuple[Name, ...], key("its serial numbers at that time")] = ()
+    rests_on: (
+        Annotated[
+            tuple[Name, ...],
+            key(
+                "the keys on which the level [rests](rig-file.md#what-the-level-rests-on), with "
+                "their values at that time; without it their changes go unnoticed"
+            ),
+        ]
+        | None
+    ) = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -47,8 +47,10 @@ def rig_calibrate(
 ) -> None:
     """Measure a figure of the rig, and write it into the rig file.
 
-    Calibrate in this order: floor, vibrator, level; pressure at any time. The command asks you for
-    each step, refuses implausible results, and leaves the file unchanged if you stop it.
+    Calibrate in this order: floor, vibrator, level; pressure at any time. A level that was measured
+    before the vibrator no longer fits, and nothing plays until it is measured again. The command
+    asks you for each step, refuses implausible results, and leaves the file unchanged if you stop
+    it.
 
     Example: tactileq rig calibrate level --rig rig.toml
     """
@@ -107,7 +109,10 @@ def _vibrator(rig: RigFile, level_g: float | None, *, seed: int) -> None:
     )
     name = f"vibrator_{datetime.now():%Y%m%d_%H%M%S}.json"
     _write(rig, save_vibrator(rig, found, name))
-    print("note: now calibrate the level, which this result changes.")
+    print(
+        "note: now calibrate the level, which this result changes; one from before it no longer "
+        "fits, and nothing plays with it."
+    )
 
 
 def _level(
@@ -185,7 +190,9 @@ def _grams(*, enough: bool) -> float:
 
 @contextmanager
 def _bench(rig: RigFile) -> Iterator[tuple[VibrationOutput, Accelerometer]]:
-    """Sound and accelerometer, open."""
+    """Sound and accelerometer, open, whether or not an earlier calibration still fits."""
+    from dataclasses import replace
+
     from tactileq.rig.desk.calibration.measuring import Accelerometer
     from tactileq.rig.desk.calibration.opening import accelerometer_input, opened_sound
     from tactileq.rig.shared.live.memory import Live
@@ -193,7 +200,7 @@ def _bench(rig: RigFile) -> Iterator[tuple[VibrationOutput, Accelerometer]]:
     with (
         accelerometer_input(rig) as source,
         Live.create() as live,
-        opened_sound(rig, live) as sound,
+        opened_sound(replace(rig, calibration=None), live) as sound,
     ):
         yield sound, Accelerometer(source)
 

@@ -2,32 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tactileq.options import RigPath
 
 if TYPE_CHECKING:
+    import datetime
+
     from rich.console import Console
 
     from tactileq.rig.desk.inventory import Finding
     from tactileq.rig.shared.setup.rig_file import RigFile
 
-_MARKS = {"ok": "", "note": "note", "fault": "missing"}
+_MARKS = {"ok": "", "note": "note", "fault": "fault"}
 _STYLES = {"ok": "", "note": "yellow", "fault": "bold red"}
 
 
-def rig_check(rig: RigPath = Path("rig.toml")) -> None:
+def rig_check(
+    rig: RigPath = Path("rig.toml"),
+    study: Annotated[
+        Path | None,
+        typer.Option(
+            "--study",
+            help="Study file (TOML) whose sessions are to run; by default one that says nothing of "
+            "rigs, and whose models fit.",
+        ),
+    ] = None,
+) -> None:
     """Show what is connected, each figure of the rig file, and what is missing for a study.
 
-    Nothing is played. If no study can run, the exit code is 1 and the last lines say why.
+    Nothing is played. The rig is judged as a session without --override judges it. If no study can
+    run, the exit code is 1 and the last lines say why.
 
     Example: tactileq rig check --rig rig.toml
+
+    Example: tactileq rig check --rig rig.toml --study study.toml
     """
     import datetime
+    from functools import partial
 
     from rich.console import Console
 
@@ -40,7 +56,9 @@ def rig_check(rig: RigPath = Path("rig.toml")) -> None:
     )
 
     console = Console()
-    loaded, of_file = of_rig(rig, today=datetime.date.today())
+    today = datetime.date.today()
+    refused_by = None if study is None else partial(_refused_by, study, today=today)
+    loaded, of_file = of_rig(rig, today=today, refused_by=refused_by)
     parts = {
         "Versions": versions(),
         "Sound devices": connected_sound(),
@@ -53,6 +71,7 @@ def rig_check(rig: RigPath = Path("rig.toml")) -> None:
         _show_figures(console, loaded)
     every = [finding for findings in parts.values() for finding in findings]
     faults = [finding for finding in every if finding.state == "fault"]
+    console.print(f"Judged by {_judged_by(study)}.", markup=False)
     for fault in faults:
         console.print(
             f"no study can run: {fault.name}: {fault.sentence}", style="red", markup=False
@@ -62,6 +81,38 @@ def rig_check(rig: RigPath = Path("rig.toml")) -> None:
     if faults:
         raise typer.Exit(1)
     console.print("A study can run on this rig.")
+
+
+def _refused_by(study: Path, rig: RigFile, *, today: datetime.date) -> Mapping[str, str]:
+    """Why sessions of this study refuse a rig."""
+    from tactileq.experiments.study.models import ModelSets, load_model_sets
+    from tactileq.experiments.study.rigs import refusals_of
+    from tactileq.experiments.study.study import Study
+    from tactileq.modeling import InputError
+
+    try:
+        plan = Study.load(study)
+    except InputError as error:
+        return {"study": str(error)}
+    try:
+        models = load_model_sets(plan, study.parent)
+        models.require(plan)
+    except InputError as error:
+        refused = refusals_of(plan, ModelSets(sets={}), rig, today=today)
+        return {**refused, "models": str(error)}
+    return refusals_of(plan, models, rig, today=today)
+
+
+def _judged_by(study: Path | None) -> str:
+    from tactileq.rig.desk.checks import Requirements
+
+    if study is not None:
+        return f"what {study} requires, and by its models"
+    usual = Requirements()
+    return (
+        f"the defaults of a study: a calibration of the last {usual.calibration_days:g} days, "
+        "force measured or assumed, models that fit; --study judges by yours"
+    )
 
 
 def _show(console: Console, title: str, findings: Sequence[Finding]) -> None:

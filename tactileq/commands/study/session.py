@@ -20,9 +20,7 @@ if TYPE_CHECKING:
     from tactileq.experiments.console.languages import Texts
     from tactileq.experiments.study.models import ModelSets
     from tactileq.experiments.study.study import Study
-    from tactileq.rig.desk.walls import Walls
     from tactileq.rig.shared.interface import TextureRig
-    from tactileq.rig.shared.setup.rig_file import RigFile
 else:
     TaskName = Literal[tuple(ANSWER_TABLES)]
 
@@ -171,32 +169,20 @@ def rig_of(plan: Study, sets: ModelSets, *, rig: Path | None, override: str | No
     InputError
         For an invalid rig file, and for a rig that does not meet the study's requirements.
     """
-    from tactileq.rig.desk.checks import Requirements, check_models
+    from tactileq.experiments.study.rigs import presented_of, requirements_of, walls_of
+    from tactileq.rig.desk.checks import check_models
     from tactileq.rig.desk.desk_rig import DeskRig
     from tactileq.rig.desk.twin import SimulatedRig
-    from tactileq.rig.shared.interface import Stimulus
     from tactileq.rig.shared.setup.rig_file import RigFile
 
-    every = [sets.of(texture, name) for name in sets.names for texture in plan.textures]
+    presented = presented_of(plan, sets)
     if rig is None:
         return SimulatedRig()
     file = RigFile.load(rig)
-    wanted = Requirements(
-        calibration_days=plan.calibration_days, measured_force=plan.measured_force
-    )
-    device = DeskRig(file, requirements=wanted, override=override, walls=walls_of(plan, file))
-    check_models(file, [shown for shown in every if not isinstance(shown, Stimulus)])
+    wanted, walls = requirements_of(plan), walls_of(plan, file)
+    device = DeskRig(file, requirements=wanted, override=override, walls=walls)
+    check_models(file, presented)
     return device
-
-
-def walls_of(plan: Study, rig: RigFile) -> Walls | None:
-    """What a force device renders; None for a rig and a study without one."""
-    from tactileq.rig.desk.walls import Walls, usual_wall
-
-    if plan.wall is None:
-        return None
-    wall, by_texture = plan.wall.walls(usual_wall(rig))
-    return Walls(usual=wall, by_texture=by_texture)
 
 
 def models_of_study(

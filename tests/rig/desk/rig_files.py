@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from datetime import date
 from pathlib import Path
 
+from tactileq.rig.desk.calibration.level import MeasuredLevel
+from tactileq.rig.desk.calibration.steps import level_figures
 from tactileq.rig.shared.interface import Fault
 from tactileq.rig.shared.setup.rig_file import RigFile
 
@@ -52,6 +54,13 @@ def rig_file(folder: Path, *changes: tuple[str, str]) -> RigFile:
         text = text.replace(old, new, 1)
     path.write_text(text, encoding="utf-8")
     return RigFile.load(path)
+
+
+def calibrated(rig: RigFile) -> RigFile:
+    """The rig after the level was calibrated as it is: it says what that rests on."""
+    level = MeasuredLevel(gain=1.0, low=1.0, high=1.0, spread_db=0.0, placements=3)
+    figures = level_figures(rig, level, band_hz=(100.0, 500.0), today=date.today())
+    return RigFile.updated(rig.path, figures)
 
 
 def failures(faults: Iterable[Fault]) -> list[str]:
