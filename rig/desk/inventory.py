@@ -266,7 +266,7 @@ def _servo(rig: RigFile, force: ForceSection) -> Finding:
         "servo",
         f"expected at most {most_ms:g} ms, twice 1/force.rate_hz, got {reached}; close other "
         "programs, allow real-time priority, or lower force.rate_hz.",
-        "fault",
+        "note",
     )
 
 

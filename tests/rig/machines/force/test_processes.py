@@ -234,6 +234,7 @@ def test_a_tool_that_answers_the_wrong_way_or_not_at_all_is_not_armed(device: St
         device.fields.mass = 50.0
         assert refused(hand.arm) == SENTENCES[Cause.UNANSWERED]
         device.fields.mass = 0.2
+        sleep(0.5)  # until the hand has caught up with it
         pressed(device, live, hand)
         assert hand.faults() == ()
 
