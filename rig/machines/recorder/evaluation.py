@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
@@ -23,7 +22,6 @@ STANDS_STILL_S = 0.1
 # The header says s, but the only published file counts ms (docs/recorder.md#files).
 _SECONDS = {"s": 1.0, "ms": 1e-3}
 _TIME_STEP = 1e-6  # six decimals
-_COMMA = re.compile(r"-?\d+,\d+(;-?\d+,\d+){3}")
 
 
 def read_evaluation(
@@ -57,7 +55,7 @@ def read_evaluation(
             "again."
         )
     lines = [line.removesuffix("\r") for line in lines]
-    if not lines or lines[0] != HEADER:
+    if not lines or lines[0].replace(";", ",") != HEADER:
         raise InputError(
             f"expected the header {HEADER} in {path.name}, got "
             f"{shown(lines[0] if lines else '')}; save it with the evaluation tool."
@@ -111,10 +109,11 @@ def _first_wrong(path: Path, rows: list[str]) -> InputError:
     """What is wrong with the first row that is not four finite numbers."""
     wrong = ((number, row) for number, row in enumerate(rows, start=2) if not _is_whole(row))
     number, row = next(wrong, (len(rows) + 1, rows[-1]))
-    if _COMMA.fullmatch(row) or row.count(",") == 7:
+    if ";" in row or row.count(",") == 7:
         return InputError(
-            f"expected points as decimal marks in {path.name}, got commas in line {number}, "
-            f"{shortened(row)}; set the computer's number format to points, and record again."
+            f"expected points as decimal marks, and commas between columns, in {path.name}, got "
+            f"other ones in line {number}, {shortened(row)}; set the computer's number format to "
+            "points and its list separator to a comma, and record again."
         )
     return InputError(
         f"expected four finite numbers in line {number} of {path.name}, got {shown(row)}; record "

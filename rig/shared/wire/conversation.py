@@ -54,6 +54,10 @@ class DeviceRefused(InputError):
         self.status = status
 
 
+class OtherDevice(InputError):
+    """A device of another kind answered."""
+
+
 @dataclass(frozen=True)
 class Hello:
     """What a device said of itself.
@@ -138,8 +142,9 @@ class Conversation:
 
         Raises
         ------
+        OtherDevice
         InputError
-            If nothing answers, something else does, or a device with another schema or firmware.
+            If nothing answers, what is no device does, or one with another schema or firmware.
         TransportLost
         """
         self._sequence, self._nonce = 0, 0
@@ -318,7 +323,7 @@ class Conversation:
     def _check(self, hello: Hello) -> None:
         wanted = self._definition
         if hello.who_am_i != wanted.who_am_i:
-            raise InputError(self._other(f"a device of kind {hello.who_am_i}"))
+            raise OtherDevice(self._other(f"a device of kind {hello.who_am_i}"))
         if hello.firmware_version != wanted.firmware_version:
             mine, other = (
                 f"{major}.{minor}"

@@ -122,10 +122,14 @@ def test_another_rate_is_refused_with_the_one_that_it_is(
 @pytest.mark.parametrize("semicolons", [True, False])
 def test_decimal_commas_are_refused(tmp_path: Path, semicolons: bool) -> None:
     path = written(tmp_path / "a.csv", noise(100), mark=",")
-    if not semicolons:
-        path.write_text(path.read_text().replace(";", ","))
-    with refused(InputError, names=[path.name, "line 2"], got="commas"):
-        read_evaluation(path, rate_hz=22704.0)
+    text = path.read_text()
+    others = [text, text.replace(HEADER, HEADER.replace(",", ";"))]
+    for other in others if semicolons else [text.replace(";", ",")]:
+        path.write_text(other)
+        with refused(
+            InputError, names=[path.name, "line 2"], expected="points", got="number format"
+        ):
+            read_evaluation(path, rate_hz=22704.0)
 
 
 @pytest.mark.parametrize(
