@@ -44,7 +44,7 @@ def test_either_kind_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
         assert found.simulated
 
 
-@pytest.mark.parametrize(("wanted", "facts"), [(OLD, ["9.9", "1.1"]), (OTHER, ["schema", "load"])])
+@pytest.mark.parametrize(("wanted", "facts"), [(OLD, ["9.9", "1.2"]), (OTHER, ["schema", "load"])])
 def test_the_first_thing_that_is_wrong_is_told(
     monkeypatch: pytest.MonkeyPatch, wanted: object, facts: list[str]
 ) -> None:
