@@ -198,7 +198,8 @@ class EvaluationFiles:
         if samples.size < wanted:
             raise SensorRefused(
                 f"expected {wanted} samples in {file.name}, got {samples.size}; have the "
-                "evaluation tool record longer."
+                f"evaluation tool record for {self._duration_s:g} s, or if it did, samples were "
+                "lost: record again."
             )
         lasted_s, held_s = samples.size / self.rate_hz, self._came_s - self._began_s
         if lasted_s > held_s + CLOCK_S:

@@ -339,12 +339,12 @@ def test_a_file_that_appears_ends_the_record_once_it_is_whole(tmp_path: Path) ->
 
 @pytest.mark.parametrize(
     ("count", "rate_hz", "names"),
-    [(300, 1000.0, ["500", "300"]), (2000, 1000.0, ["clocks", "2.00"])],
+    [(468, 1000.0, ["500", "468", "lost"]), (2000, 1000.0, ["clocks", "2.00"])],
 )
 def test_files_too_short_or_longer_than_speed_was_held_are_refused(
     tmp_path: Path, count: int, rate_hz: float, names: list[str]
 ) -> None:
-    """The second is what a sensor at another rate than the file says gives."""
+    """The first has lost a frame; the second is of a sensor at another rate than the file says."""
     sensor = EvaluationFiles(tmp_path, rate_hz=rate_hz, axis="z", wait_s=5.0)
     sensor.begin(0.5)
     written(tmp_path / "a.csv", noise(count), rate_hz=rate_hz)
