@@ -224,7 +224,7 @@ RECORDER = Kind(
                 "name": "player",
                 "address": "/dev/ttyACM0",
                 "baud": 500_000,
-                "simulated": True,
+                "simulated": False,
             },
             "sample": {
                 "radius": figure(41, "mm"),
@@ -257,7 +257,7 @@ RECORDER = Kind(
         },
         {
             "version": 1,
-            "recorder": {"name": "player", "address": "simulated"},
+            "recorder": {"name": "player", "address": "/dev/ttyACM0"},
             "sensor": {"device": "USB", "channel": 2, "g_per_fullscale": figure(40, "g")},
         },
     ),

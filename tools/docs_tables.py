@@ -27,6 +27,7 @@ from tactileq.modeling.recordings import recording_set, trajectory
 from tactileq.modeling.scenes import microcontrollers
 from tactileq.rig.devices.hand import scripted
 from tactileq.rig.machines.device.definition import DEVICE
+from tactileq.rig.machines.device.models import UPLOAD_RANGES
 from tactileq.rig.machines.recorder import store as recorder_store
 from tactileq.rig.machines.recorder.definition import RECORDER
 from tactileq.rig.recording.capture import pieces
@@ -60,6 +61,7 @@ PAGES = (
     "docs/study-file.md",
     "docs/saved-files.md",
     "docs/data.md",
+    "docs/device.md",
     "docs/device-registers.md",
     "docs/recorder.md",
     "docs/recorder-registers.md",
@@ -109,10 +111,22 @@ def room_table() -> str:
     return "\n".join(("| folder | holds |", "|---|---|", *rows))
 
 
+def upload_table() -> str:
+    """What the device refuses an upload for, and the ranges of its numbers."""
+    rows = ["| value | ModelFault | range of its numbers | |", "|---|---|---|---|"]
+    for name, (value, meaning) in DEVICE.masks["ModelFault"].members.items():
+        of = UPLOAD_RANGES.get(name.lower())
+        if value:
+            note = of.note if of and of.note else meaning
+            rows.append(f"| {value} | `{name}` | {of or ''} | {note} |")
+    return "\n".join(rows)
+
+
 _MADE = {
     "rooms": lambda name: room_table(),
     "keys": lambda name: key_tables(declared(name)),
     "table": lambda name: markdown(TABLES[name]).rstrip("\n"),
+    "upload": lambda name: upload_table(),
     "device": lambda name: _OF_A_DEVICE[name](DEVICE),
     "recorder": lambda name: _OF_A_DEVICE[name](RECORDER),
 }

@@ -47,7 +47,7 @@ def test_the_check_and_the_question_say_what_is_there(
 ) -> None:
     device_rig(tmp_path, device.address)
     said = " ".join(main("rig", "check").stdout.split())
-    assert "tactileq-cables, firmware 1.1" in said
+    assert "tactileq-cables, firmware 1.2" in said
     assert "state IDLE, last cause NONE: simulated" in said
     assert "passive up to 1.67 N/mm" in said
     asked = main("rig", "device", device.address)

@@ -454,7 +454,7 @@ PIECES = (
     b"00002.wav\toak\t80.0\t1.0\t1\t5000.0\t900\t81\t2\t1\t0.1\ttrue\tfalse\n"
 )
 EVALUATION = b"Time(s),ax(g),ay(g),az(g)\n" + b"".join(
-    b"%.6f,0.1,%.4f,-0.2\n" % (n / 1000, n / 50) for n in range(40)
+    b"%.6f,0.1,%.4f,%.4f\n" % (n / 1000, n / 50, -n / 40) for n in range(40)
 )
 RECORDER_PLAN = b"""{"texture": "oak", "conditions": [[50.0, 1.0], [100.0, 1.0], [100.0, 2.0]],
 "rate_hz": 1000.0, "duration_s": 0.4, "repeat": 1, "radius_mm": 40.0, "simulated": false}

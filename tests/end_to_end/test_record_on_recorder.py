@@ -93,6 +93,36 @@ def test_what_cannot_be_recorded_is_refused(
     assert not (tmp_path / "out").exists()
 
 
+def test_a_plan_does_not_go_on_under_another_seed(main: Any, tmp_path: Path) -> None:
+    (tmp_path / "grid.toml").write_text(GRID)
+    words = ("record", "out", "--recorder", "simulated", "--texture", "canvas", "--duration", 0.4)
+    words = (*words, "--grid", "grid.toml", "--seed")
+    assert main(*words, 5).returncode == 0
+    before = {path: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    refused = main(*words, 6)
+    assert refused.returncode != 0
+    check_refusal(refused.stderr, names="canvas", expected="--seed 5", got=6)
+    assert {path: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
+    assert "0 of them in this run" in main(*words, 5).stdout
+
+
+@pytest.mark.parametrize("where", ["address", "simulated"])
+@pytest.mark.parametrize(
+    ("sensor", "name"),
+    [('files = "adcm"', "sensor.files"), ('device = "USB"', "sensor.device")],
+)
+def test_a_sensor_of_a_simulated_recorder_is_refused(
+    main: Any, tmp_path: Path, where: str, sensor: str, name: str
+) -> None:
+    text = COLD.format(name="a", address="simulated" if where == "address" else "socket://h:1")
+    text = text.replace("simulated = true\n", "" if where == "address" else "simulated = true\n")
+    scale = 'g_per_fullscale = { value = 1, unit = "g", assumed = true, source = "a guess" }'
+    (tmp_path / "recorder.toml").write_text(f"{text}[sensor]\n{sensor}\n{scale}\n")
+    refused = main("record", "out", "--recorder", "recorder.toml", "--texture", "oak")
+    assert refused.returncode != 0
+    check_refusal(refused.stderr, names="recorder.toml", expected=[name, "simulated"], got="both")
+
+
 def test_the_shipped_file_is_the_default_law() -> None:
     from tactileq.rig.machines.recorder.law import RecorderLaw
 

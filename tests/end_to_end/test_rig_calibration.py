@@ -102,6 +102,11 @@ def test_monitor_ends_by_itself_with_a_line(
     assert blocks is not None, done.stdout
     assert int(blocks[2]) > 0
     assert int(blocks[4]) > 0
+    # Both are counted in the seconds that it states, not since their processes began.
+    seconds, block_s = float(line.partition(" s: ")[0]), RigFile.load(rig).output_block_s
+    assert seconds >= 1.5
+    assert int(blocks[2]) * block_s <= seconds + 0.5
+    assert int(blocks[4]) * block_s <= seconds + 0.5
     assert re.search(r"takes [\d.]+% of a block \(median\), [\d.]+% in 99.9 % of blocks$", line)
 
 

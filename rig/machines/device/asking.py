@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from tactileq.modeling.errors import InputError
 from tactileq.rig.machines.device.definition import DEVICE
-from tactileq.rig.shared.wire.conversation import Conversation, Hello
+from tactileq.rig.shared.wire.conversation import Conversation, Hello, OtherDevice
 from tactileq.rig.shared.wire.definition import Definition, Value
 from tactileq.rig.shared.wire.transports import TransportLost, opened_transport
 
@@ -73,20 +73,21 @@ def asked(address: str, baud: int, definitions: Sequence[Definition] = (DEVICE,)
     Raises
     ------
     InputError
-        If nothing is there, or another device.
+        If nothing is there, another device, or one of them with other firmware.
     """
     transport = opened_transport(address, baud)
+    others: list[OtherDevice] = []
     try:
         for definition in definitions:
             talk = Conversation(transport, definition)
             try:
                 hello = talk.hello()
-            except InputError as error:
-                refused = error
+            except OtherDevice as error:  # it may be the next one; all else is wrong with it
+                others.append(error)
                 continue
             names = [name for name in (*STATED, *RANGES, *COUNTED) if name in definition.registers]
             return Asked(definition, hello, {name: talk.read(name) for name in names})
-        raise refused
+        raise others[0]
     except TransportLost as lost:
         raise InputError(
             f"expected a device that stays at {address}, got an end: {lost} Check its cable and "

@@ -684,6 +684,8 @@ static inline int tq_device_apply(tq_device *d, const tqd_register *r, const uin
         return tq_device_queue(d, value, r->length);
     if ((r->address == TQD_SIMULATE || r->address == TQD_STROKE) && !d->board.simulated)
         return TQD_STATUS_ACCESS;
+    if (r->address == TQD_SOURCE && value[0] == TQD_SOURCE_MODEL && !d->playing)
+        return TQD_STATUS_STATE; /* there is no model */
     memcpy((uint8_t *)v + r->offset, value, (size_t)r->bytes * r->length);
     switch (r->address) {
     case TQD_HEARTBEAT:
@@ -787,15 +789,19 @@ static inline int tq_device_data(tq_device *d, const tq_frame *f)
 static inline int tq_device_finish(tq_device *d, const tq_frame *f)
 {
     uint64_t hash;
-    int slot = d->slot;
+    int slot = d->slot, fault;
     if (f->length != 9)
         return TQD_STATUS_LENGTH;
     memcpy(&hash, f->body + 1, 8);
     if (slot < 0)
         return TQD_STATUS_STATE;
     d->slot = -1;
-    if (d->upload_count != d->upload_bytes || hash != tq_hash(d->uploads[slot].bytes, d->upload_count)
-        || !tq_model_of(&d->uploads[slot], d->upload_count, TQ_TICK_HZ, &d->textures[slot]))
+    if (d->upload_count != d->upload_bytes || hash != tq_hash(d->uploads[slot].bytes, d->upload_count))
+        fault = TQD_MODELFAULT_HASH;
+    else
+        fault = tq_model_fault(&d->uploads[slot], d->upload_count, TQ_TICK_HZ, &d->textures[slot]);
+    d->values.model_fault = (uint8_t)fault;
+    if (fault)
         return TQD_STATUS_MODEL;
     d->hashes[slot] = hash;
     d->board.lock(d->board.context);

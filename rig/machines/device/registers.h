@@ -9,8 +9,8 @@
 #include <stdint.h>
 
 #define TQD_WHO_AM_I_VALUE 29012
-#define TQD_FIRMWARE_VERSION_VALUE 257
-#define TQD_SCHEMA_HASH_VALUE UINT64_C(0xea2a74165cf21d2e)
+#define TQD_FIRMWARE_VERSION_VALUE 258
+#define TQD_SCHEMA_HASH_VALUE UINT64_C(0x03a73ebbd8c88b2c)
 
 /* Addresses. */
 enum {
@@ -73,6 +73,7 @@ enum {
     TQD_SHUTDOWN_ERROR = 59,
     TQD_TICKS_LATE = 60,
     TQD_TICK_CLOCKS = 61,
+    TQD_MODEL_FAULT = 62,
     TQD_SIMULATE = 64,
     TQD_STROKE = 65,
     TQD_SIMULATED = 66,
@@ -168,6 +169,37 @@ enum {
     TQD_STATUS_FULL = 12, /* there is no room for so many samples */
 };
 
+/* Why the last upload was refused with the status MODEL; the ranges stand in docs/device.md. */
+enum {
+    TQD_MODELFAULT_NONE = 0,
+    TQD_MODELFAULT_HASH = 1, /* the hash is another one, or bytes are missing */
+    TQD_MODELFAULT_HEAD = 2, /* it does not begin with TQM1, or the reals are of another size than RealSize */
+    TQD_MODELFAULT_LAYERS = 3,
+    TQD_MODELFAULT_GRID = 4, /* of less than two speeds or forces */
+    TQD_MODELFAULT_SIZE = 5, /* not as many bytes as these counts give, or less than 24 */
+    TQD_MODELFAULT_UPDATE_SAMPLES = 6,
+    TQD_MODELFAULT_LONGEST = 7,
+    TQD_MODELFAULT_PAUSE = 8,
+    TQD_MODELFAULT_MODEL_RATE_HZ = 9,
+    TQD_MODELFAULT_SPEED_CHANGE = 10,
+    TQD_MODELFAULT_FORCE_CHANGE = 11,
+    TQD_MODELFAULT_SLOPE_SHARE = 12,
+    TQD_MODELFAULT_HOLD = 13,
+    TQD_MODELFAULT_RELEASE = 14,
+    TQD_MODELFAULT_PEAK = 15,
+    TQD_MODELFAULT_MEAN_SQUARE = 16,
+    TQD_MODELFAULT_MEAN_SHARE = 17,
+    TQD_MODELFAULT_SILENCE = 18,
+    TQD_MODELFAULT_NOTCH_HZ = 19,
+    TQD_MODELFAULT_NOTCH_WIDTH_HZ = 20,
+    TQD_MODELFAULT_NOTCH_SHARE = 21,
+    TQD_MODELFAULT_SPEED_MM_S = 22, /* out of its range, or it does not rise */
+    TQD_MODELFAULT_FORCE_N = 23, /* out of its range, or it does not rise */
+    TQD_MODELFAULT_SIGNS = 24,
+    TQD_MODELFAULT_SLEWS = 25,
+    TQD_MODELFAULT_VALUES = 26,
+};
+
 /* Of a record in an event frame. */
 enum {
     TQD_FLAGS_CONTACT = 1, /* the force is at least ContactForce */
@@ -242,6 +274,7 @@ typedef struct {
     uint8_t speed_delay;
     uint8_t button;
     uint8_t shutdown_error;
+    uint8_t model_fault;
     uint8_t simulate;
     uint8_t simulated;
     uint8_t homed;
@@ -355,6 +388,7 @@ static const tqd_register tqd_registers[] = {
     { TQD_SHUTDOWN_ERROR, TQD_INTEGER, 1, 1, TQD_READS, 0, 0, offsetof(tqd_values, shutdown_error) },
     { TQD_TICKS_LATE, TQD_INTEGER, 4, 1, TQD_READS, 0, 0, offsetof(tqd_values, ticks_late) },
     { TQD_TICK_CLOCKS, TQD_INTEGER, 4, 2, TQD_READS, 0, 0, offsetof(tqd_values, tick_clocks) },
+    { TQD_MODEL_FAULT, TQD_INTEGER, 1, 1, TQD_READS, 0, 0, offsetof(tqd_values, model_fault) },
     { TQD_SIMULATE, TQD_INTEGER, 1, 1, TQD_WRITES, 26, 0, offsetof(tqd_values, simulate) },
     { TQD_STROKE, TQD_FLOAT, 4, 3, TQD_READS | TQD_WRITES, 27, 1, offsetof(tqd_values, stroke) },
     { TQD_SIMULATED, TQD_INTEGER, 1, 1, TQD_READS, 0, 0, offsetof(tqd_values, simulated) },
@@ -362,6 +396,6 @@ static const tqd_register tqd_registers[] = {
     { TQD_EMERGED, TQD_FLOAT, 4, 10, TQD_READS, 0, 0, offsetof(tqd_values, emerged) },
 };
 
-enum { TQD_REGISTERS = 64 };
+enum { TQD_REGISTERS = 65 };
 
 #endif

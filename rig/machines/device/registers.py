@@ -102,6 +102,38 @@ class DeviceStatus(IntEnum):
     FULL = 12
 
 
+class DeviceModelFault(IntEnum):
+    """Why the last upload was refused with the status MODEL."""
+
+    NONE = 0
+    HASH = 1
+    HEAD = 2
+    LAYERS = 3
+    GRID = 4
+    SIZE = 5
+    UPDATE_SAMPLES = 6
+    LONGEST = 7
+    PAUSE = 8
+    MODEL_RATE_HZ = 9
+    SPEED_CHANGE = 10
+    FORCE_CHANGE = 11
+    SLOPE_SHARE = 12
+    HOLD = 13
+    RELEASE = 14
+    PEAK = 15
+    MEAN_SQUARE = 16
+    MEAN_SHARE = 17
+    SILENCE = 18
+    NOTCH_HZ = 19
+    NOTCH_WIDTH_HZ = 20
+    NOTCH_SHARE = 21
+    SPEED_MM_S = 22
+    FORCE_N = 23
+    SIGNS = 24
+    SLEWS = 25
+    VALUES = 26
+
+
 class DeviceFlags(IntFlag):
     """Of a record in an event frame."""
 

@@ -209,6 +209,15 @@ class RecorderFile(DescribedFile):
     sensor: SensorSection = field(default=SensorSection())
     path: Annotated[Path, BESIDE] = Path()
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        given = [name for name in ("files", "device") if getattr(self.sensor, name) is not None]
+        if self.simulated and given:
+            raise InputError(
+                f"expected sensor.{given[0]} of a real recorder, or a simulated one, whose "
+                "vibration is drawn, got both; remove one of them."
+            )
+
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """Read a recorder file (TOML).
@@ -217,7 +226,7 @@ class RecorderFile(DescribedFile):
         ------
         InputError
             If the file is missing, no TOML or of another version, has unknown or missing keys,
-            other units, or values out of range.
+            other units, values out of range, or a sensor of a simulated recorder.
         """
         file = Path(path)
         with naming(file):

@@ -16,7 +16,7 @@ from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import InputError
 from tactileq.modeling.files.places import matching
 from tactileq.modeling.models.grid import Condition
-from tactileq.rig.machines.recorder.evaluation import Axis, read_evaluation
+from tactileq.rig.machines.recorder.evaluation import Axis, check_alive, read_evaluation
 from tactileq.rig.recording.capture.input import AudioInput, InputBlock
 
 SETTLED_S = 0.5  # a file that has not changed for so long may be whole
@@ -122,7 +122,7 @@ class EvaluationFiles:
     wait_s : float
         Longest time that speed and force are held for a file.
     tell : callable
-        Is told when a file is to be saved.
+        Is told when a file is to be saved, and what is to be known of how they are read.
 
     Raises
     ------
@@ -147,6 +147,7 @@ class EvaluationFiles:
         self.rate_hz = rate_hz
         self._folder, self._axis, self._wait_s, self._tell = folder, axis, wait_s, tell
         self._before: set[_Seen] = set()
+        self._noted: set[str] = set()
         self._duration_s = self._began_s = self._came_s = 0.0
         self._growing: tuple[_Seen, ...] = ()
 
@@ -191,12 +192,14 @@ class EvaluationFiles:
             raise SensorRefused(str(refused)) from None
 
     def _read(self, file: Path) -> Floats:
-        samples = read_evaluation(file, rate_hz=self.rate_hz, axis=self._axis)
+        notes: list[str] = []
+        samples = read_evaluation(file, rate_hz=self.rate_hz, axis=self._axis, tell=notes.append)
         wanted = round(self._duration_s * self.rate_hz)
         if samples.size < wanted:
             raise SensorRefused(
                 f"expected {wanted} samples in {file.name}, got {samples.size}; have the "
-                "evaluation tool record longer."
+                f"evaluation tool record for {self._duration_s:g} s, or if it did, samples were "
+                "lost: record again."
             )
         lasted_s, held_s = samples.size / self.rate_hz, self._came_s - self._began_s
         if lasted_s > held_s + CLOCK_S:
@@ -205,6 +208,10 @@ class EvaluationFiles:
                 f"were held, got {lasted_s:.2f} s; it began too early, or the clocks of sensor and "
                 "wire disagree: correct sensor.rate_hz."
             )
+        for note in notes:
+            if note not in self._noted:  # once for all files
+                self._noted.add(note)
+                self._tell(f"{file.name}: {note}")
         return samples[:wanted]
 
     def _seen(self) -> list[_Seen]:
@@ -270,6 +277,7 @@ class SoundCardSensor:
                 f"expected samples below the sound card's full scale, got {clipped} at it; lower "
                 "its input gain, calibrate it again, then record again."
             )
+        check_alive(heard, rate_hz=self.rate_hz, where="what the sound card heard")
         return heard * self._source.settings.g_per_fullscale
 
     def clock_s(self) -> float | None:

@@ -41,9 +41,14 @@ def _number(name: str, unit: str, description: str) -> Column:
 
 RECORDER_COLUMNS = (
     Column("texture", description="Name of the surface", required=True),
-    *chosen(INDEX_COLUMNS, "speed_mm_s", "force_n"),
+    *(
+        replace(column, description=f"{description} that was commanded, the condition")
+        for column, description in zip(
+            chosen(INDEX_COLUMNS, "speed_mm_s", "force_n"), ("Speed", "Force"), strict=True
+        )
+    ),
     *(replace(column, optional=False, required=True) for column in chosen(INDEX_COLUMNS, "repeat")),
-    _number("mean_speed_mm_s", "mm/s", "Mean of the estimated speed"),
+    _number("mean_speed_mm_s", "mm/s", "Mean speed, by the turntable's encoder"),
     _number("speed_sd_mm_s", "mm/s", "Its standard deviation"),
     _number("mean_force_n", "N", "Mean of the estimated force"),
     _number("force_sd_n", "N", "Its standard deviation"),
@@ -83,6 +88,7 @@ class RecorderPlan(FileSection):
     repeat: Annotated[int, key("number of the repeat of each condition", ge=1)]
     radius_mm: Annotated[float, key("of the track", unit="mm", gt=0)]
     simulated: Annotated[bool, key("whether the recorder is simulated")]
+    seed: Annotated[int, key("of a simulated recorder", ge=0)] | None = None
 
 
 @dataclass(frozen=True)
@@ -118,11 +124,14 @@ class RecorderStore:
         From the turntable's axis to the ball.
     provenance : mapping
         Of this run.
+    seed : int, optional
+        Of a simulated recorder.
 
     Raises
     ------
     InputError
-        For a folder that holds something else, or an interrupted plan of another texture or rate.
+        For a folder that holds something else, an interrupted plan of another texture or rate, or
+        the same texture and repeat of another seed.
     """
 
     def __init__(
@@ -132,9 +141,10 @@ class RecorderStore:
         *,
         radius_mm: float,
         provenance: Mapping[str, Any] | None = None,
+        seed: int | None = None,
     ) -> None:
         self.folder = folder_behind(folder)
-        self.plan, self._radius_mm = plan, radius_mm
+        self.plan, self._radius_mm, self._seed = plan, radius_mm, seed
         self._provenance = dict(provenance or {})
         check_continues(self.folder, PLAN_NAME)
         self._check_interrupted()
@@ -259,6 +269,7 @@ class RecorderStore:
             repeat=plan.repeat,
             radius_mm=self._radius_mm,
             simulated=plan.simulated,
+            seed=self._seed,
         )
 
     def _check_interrupted(self) -> None:
@@ -270,6 +281,7 @@ class RecorderStore:
         before = RecorderPlan.read(
             read_json_object(path, what="a recorder's plan", advice=advice), folder=self.folder
         )
+        self._check_seed(before)
         wanted = set(before.conditions)
         done = wanted & recorded_conditions(self.folder, before.texture, before.repeat)
         if done == wanted:
@@ -283,6 +295,16 @@ class RecorderStore:
                     f"which has {name} {_plain(was)}, got {_plain(now)}; finish it, or choose "
                     "another folder."
                 )
+
+    def _check_seed(self, before: RecorderPlan) -> None:
+        """Refuse another sample for the same recordings, whether or not the plan is finished."""
+        same = (before.texture, before.repeat) == (self.plan.texture, self.plan.repeat)
+        if same and None not in (before.seed, self._seed) and before.seed != self._seed:
+            raise InputError(
+                f"expected to go on with --seed {before.seed}, as the recordings of "
+                f"{before.texture} in {self.folder} were begun, got {self._seed}; give --seed "
+                f"{before.seed}, or choose another folder, or another --repeat."
+            )
 
 
 def _plain(value: object) -> str:

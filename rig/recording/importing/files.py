@@ -248,23 +248,27 @@ def _even(
     if given_hz is None:
         rate_hz = time.rate_hz()
         uneven = time.unevenness(rate_hz)
+        doubt, either = time.unit_doubt(SHORTEST_MODELLED_S)
+        doubts, notes = ((doubt,), ()) if either else ((), (doubt,) if doubt else ())
         if uneven is None:
-            return rate_hz, axes, (), ()
+            return rate_hz, axes, notes, doubts
         note = (
             f"{path.name}: {uneven}; they were resampled at even times by a spline through their "
             "own ones; if only the times are uneven, give --rate."
         )
-        return rate_hz, time.resampled(axes, rate_hz), (note,), ()
+        return rate_hz, time.resampled(axes, rate_hz), (*notes, note), doubts
+    time, other_unit = time.by_rate(given_hz)
+    told = (other_unit,) if other_unit else ()
     contradiction = time.contradiction(given_hz)
     uneven = None if contradiction else time.unevenness(given_hz)
     if uneven is None:
-        return given_hz, axes, (), (contradiction,) if contradiction else ()
+        return given_hz, axes, told, (contradiction,) if contradiction else ()
     note = (
         f"{path.name}: {uneven}, but are taken as evenly spaced, as --rate says; if they are not, "
         f"that turns {uneven.share:.0%} of the power of a vibration at {uneven.highest_hz:.4g} Hz "
         "into noise, and less at lower frequencies."
     )
-    return given_hz, axes, (note,), ()
+    return given_hz, axes, (*told, note), ()
 
 
 def _check_overload(path: Path, axes: Floats, rows: slice) -> None:

@@ -21,6 +21,7 @@ LONGEST_GAP = 2.5
 MOST_BREAKS = 10
 # A tool's vibration needs more; a rate below this means time in another unit than supposed.
 LOWEST_RATE_HZ = 20.0
+# Below this it may mean so, even if the header names the unit.
 LOWEST_RATE_WITHOUT_TIME_UNIT_HZ = 250.0
 RATE_TOLERANCE = 0.005
 # Share of the power at the highest frequency of a model that jitter may turn into noise (-20 dB).
@@ -103,6 +104,40 @@ class TimeColumn:
                 "give --rate."
             )
         return rate_hz
+
+    def by_rate(self, rate_hz: float) -> tuple[TimeColumn, str]:
+        """The same in the unit that agrees with a rate that was given, and a sentence about it.
+
+        As it is, with no sentence, where its own unit agrees or gives a rate that a vibration has,
+        or none does.
+        """
+        if not self.unit or not self.has_a_rate():
+            return self, ""
+        by_unit = self._rates_hz(1 / self.rate_hz() / SECONDS_PER_UNIT[self.unit])
+        for unit, hz in by_unit.items():
+            if abs(rate_hz / hz - 1) <= RATE_TOLERANCE and unit != self.unit:
+                return replace(self, unit=unit), (
+                    f"{self.file}: the header {shown(self.name)} says {self.unit}, but the times "
+                    f"are taken in {unit}, in which they agree with --rate {rate_hz:g}."
+                )
+        return self, ""
+
+    def unit_doubt(self, shortest_s: float) -> tuple[str, bool]:
+        """A sentence where its header may name the wrong unit: it gives a rate of few vibrations.
+
+        And whether in a unit a thousandth as long the samples still last `shortest_s`, so that
+        either is possible.
+        """
+        units = [unit for unit in SECONDS_PER_UNIT if unit]
+        rate_hz = self.rate_hz()
+        if self.unit not in units[:-1] or rate_hz > LOWEST_RATE_WITHOUT_TIME_UNIT_HZ:
+            return "", False
+        other, other_hz = units[units.index(self.unit) + 1], 1e3 * rate_hz
+        return (
+            f"{self.file}: expected a rate above {LOWEST_RATE_WITHOUT_TIME_UNIT_HZ:g} Hz, got "
+            f"{rate_hz:.6g} Hz with times in {self.unit}, as the header {shown(self.name)} says, "
+            f"or {other_hz:.6g} Hz with times in {other}; give the right one as --rate."
+        ), self.values.size / other_hz >= shortest_s
 
     def has_a_rate(self) -> bool:
         """Whether `rate_hz` does."""
@@ -203,7 +238,7 @@ class TimeColumn:
             if unit
         }
         unit = self.unit or "s"
-        if self._lowest_hz < rates[unit] <= HIGHEST_RATE_HZ:
+        if LOWEST_RATE_WITHOUT_TIME_UNIT_HZ < rates[unit] <= HIGHEST_RATE_HZ:
             return {unit: rates[unit]}
         return {unit: hz for unit, hz in rates.items() if LOWEST_RATE_HZ < hz <= HIGHEST_RATE_HZ}
 

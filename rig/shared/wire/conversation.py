@@ -26,7 +26,7 @@ HELLO_S = 3.0  # many boards restart when their port is opened
 _HELLO_AGAIN_S = 0.2
 _HELLO = struct.Struct("<HHQfBI")
 _EVENT = struct.Struct("<IIHB")
-_STATUS_OK, _STATUS_NONCE, _STATUS_SEQUENCE, _STATUS_BUSY = 0, 6, 7, 11
+_STATUS_OK, _STATUS_NONCE, _STATUS_SEQUENCE, _STATUS_MODEL, _STATUS_BUSY = 0, 6, 7, 10, 11
 _MOST_DATA = 231  # bytes of an upload's body less its own head
 _BUSY_S = 0.1
 _MOST_BLOCKS = 4096
@@ -52,6 +52,10 @@ class DeviceRefused(InputError):
     def __init__(self, sentence: str, status: int) -> None:
         super().__init__(sentence)
         self.status = status
+
+
+class OtherDevice(InputError):
+    """A device of another kind answered."""
 
 
 @dataclass(frozen=True)
@@ -138,8 +142,9 @@ class Conversation:
 
         Raises
         ------
+        OtherDevice
         InputError
-            If nothing answers, something else does, or a device with another schema or firmware.
+            If nothing answers, what is no device does, or one with another schema or firmware.
         TransportLost
         """
         self._sequence, self._nonce = 0, 0
@@ -208,8 +213,21 @@ class Conversation:
                 self.exchange(Kind.UPLOAD, body, "to take a model")
                 return
             except DeviceRefused as refused:
+                if refused.status == _STATUS_MODEL:
+                    raise self._no_model() from None
                 if refused.status != _STATUS_BUSY or self._transport.now_s() > end_s:
                     raise
+
+    def _no_model(self) -> DeviceRefused:
+        """Which part of an upload the device has refused."""
+        fault = self.read("ModelFault")
+        members = self._definition.masks["ModelFault"].members
+        name = next((name for name, (value, _) in members.items() if value == fault), str(fault))
+        return DeviceRefused(
+            f"expected a model that the device can render, got one that it refuses for its "
+            f"{name.lower()}; see docs/device.md#models.",
+            _STATUS_MODEL,
+        )
 
     def exchange(self, kind: Kind, body: bytes, what: str) -> bytes:
         """Send one frame and wait for its reply; the body without the status.
@@ -318,7 +336,7 @@ class Conversation:
     def _check(self, hello: Hello) -> None:
         wanted = self._definition
         if hello.who_am_i != wanted.who_am_i:
-            raise InputError(self._other(f"a device of kind {hello.who_am_i}"))
+            raise OtherDevice(self._other(f"a device of kind {hello.who_am_i}"))
         if hello.firmware_version != wanted.firmware_version:
             mine, other = (
                 f"{major}.{minor}"

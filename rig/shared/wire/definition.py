@@ -232,22 +232,28 @@ class Definition:
         return cls(file.device, file.description, file.whoAmI, (major, minor), masks, registers)
 
     @cached_property
+    def schema_text(self) -> str:
+        """Everything on which both sides must agree, so not descriptions and order.
+
+        docs/device.md#schema-hash
+        """
+        major, minor = self.firmware_version
+        lines = [["schema", SCHEMA], ["device", self.name, self.who_am_i, f"{major}.{minor}"]]
+        for r in sorted(self.registers.values(), key=lambda r: r.address):
+            access = "r" * r.reads + "w" * r.writes
+            ranges = (f"{low:.9g}:{high:.9g}" for low, high in r.ranges)
+            row = ["register", r.address, r.name, r.type, r.length, access, r.when, r.unit]
+            lines.append([*row, *ranges])
+        for mask in sorted(self.masks.values(), key=lambda mask: mask.name):
+            members = sorted((value, name) for name, (value, _) in mask.members.items())
+            kind = "bits" if mask.bits else "values"
+            lines.append(["mask", mask.name, kind, *(f"{value}={name}" for value, name in members)])
+        return "".join("\t".join(map(str, line)) + "\n" for line in lines)
+
+    @cached_property
     def sha256(self) -> str:
-        """Of everything on which both sides must agree, so not of descriptions and order."""
-        agreed = [
-            (r.address, r.name, r.type, r.length, r.reads, r.writes, r.ranges, r.when, r.unit)
-            for r in sorted(self.registers.values(), key=lambda r: r.address)
-        ]
-        masks = [
-            (
-                mask.name,
-                mask.bits,
-                sorted((value, name) for name, (value, _) in mask.members.items()),
-            )
-            for mask in sorted(self.masks.values(), key=lambda mask: mask.name)
-        ]
-        text = repr((SCHEMA, self.name, self.who_am_i, self.firmware_version, agreed, masks))
-        return hashlib.sha256(text.encode()).hexdigest()
+        """Of `schema_text`."""
+        return hashlib.sha256(self.schema_text.encode()).hexdigest()
 
     @property
     def schema_hash(self) -> int:

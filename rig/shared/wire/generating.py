@@ -109,7 +109,13 @@ def python_module(definition: Definition, prefix: str = "Device") -> str:
 
 def register_table(definition: Definition) -> str:
     """Its registers in Markdown."""
-    head = "| address | register | type | access | range | unit | meaning |"
+    head = "| address | register | type | access | range, or value | unit | meaning |"
+    major, minor = definition.firmware_version
+    fixed = {
+        "WhoAmI": str(definition.who_am_i),
+        "FirmwareVersion": str(256 * major + minor),
+        "SchemaHash": f"{definition.schema_hash:#018x}",
+    }
     rows = [head, "|---|---|---|---|---|---|---|"]
     for r in sorted(definition.registers.values(), key=lambda r: r.address):
         access = "/".join(["read"] * r.reads + ["write"] * r.writes)
@@ -120,7 +126,7 @@ def register_table(definition: Definition) -> str:
             f"`{r.name}`",
             r.type if r.length == 1 else f"{r.type}[{r.length}]",
             access,
-            _range_words(r),
+            fixed.get(r.name, _range_words(r)),
             r.unit,
             f"{r.description}{of}",
         )
@@ -154,7 +160,11 @@ def vectors(definition: Definition) -> str:
         }
         for what, frame in _frames(definition)
     ]
-    head = {"device": definition.name, "schemaHash": f"{definition.schema_hash:016x}"}
+    head = {
+        "device": definition.name,
+        "schemaHash": f"{definition.schema_hash:016x}",
+        "schema": definition.schema_text.splitlines(),
+    }
     return json.dumps(head | {"frames": rows}, indent=1, ensure_ascii=False) + "\n"
 
 

@@ -250,7 +250,7 @@ def _plan_run(
 ) -> PlanRun:
     """What is still to be recorded into the folder."""
     from tactileq.rig.machines.recorder.recording import PlanRun
-    from tactileq.rig.machines.recorder.store import RecorderStore
+    from tactileq.rig.machines.recorder.store import TABLE_NAME, RecorderStore
     from tactileq.rig.recording.capture.pieces import Plan
 
     plan = Plan(
@@ -261,12 +261,20 @@ def _plan_run(
         repeat=options.repeat,
         simulated=file.simulated,
     )
-    settings = settings_of_run(folder, plan, recorder=file.recorder.name, law=asdict(file.law()))
+    settings = settings_of_run(
+        folder,
+        plan,
+        recorder=file.recorder.name,
+        law=asdict(file.law()),
+        conditions=f"as commanded; what was held stands in {TABLE_NAME}",
+    )
+    seed = options.seed if file.simulated else None
     store = RecorderStore(
         folder,
         plan,
         radius_mm=file.sample.radius.value,
-        provenance=ran.provenance(settings, seed=options.seed if file.simulated else None),
+        provenance=ran.provenance(settings, seed=seed),
+        seed=seed,
     )
     return PlanRun(device, sensor, store, file.sample.run_in_s, tell=_say)
 

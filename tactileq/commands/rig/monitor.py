@@ -70,21 +70,25 @@ def _watch(rig: RigFile, model: AnyModel | None, seconds: float | None) -> None:
         hand_reader(rig, live) as hand,
         opened_sound(rig, live, hand=hand) as sound,
     ):
-        monitor = Monitor(live, rate_hz=rate_hz, peak_g=rig.limits.peak_g.value, grid=_grid(model))
         bare = Child("tactileq.rig.devices.monitoring.bare_thread", period_s)
         bare.ready(Done)
         if model is not None:
             sound.play(model)
-        start = time.monotonic()
         faults: list[str] = []
-        snapshot, missed = monitor.look(), bare.ask(Look(), WakeUps)
+        # Everything is counted from here on, not since its process began.
+        start = now = time.monotonic()
+        before = bare.ask(Look(), WakeUps)
+        monitor = Monitor(live, rate_hz=rate_hz, peak_g=rig.limits.peak_g.value, grid=_grid(model))
+        snapshot, missed = monitor.look(), WakeUps(0, 0)
         try:
             with Screen(auto_refresh=False, transient=True) as screen:
-                while seconds is None or time.monotonic() - start < seconds:
+                while seconds is None or now - start < seconds:
                     time.sleep(_EVERY_S)
                     faults += [*hand.faults(), *sound.faults()]
                     _play_on(sound, model, faults)
-                    snapshot, missed = monitor.look(), bare.ask(Look(), WakeUps)
+                    snapshot = monitor.look()
+                    missed = _since(before, bare.ask(Look(), WakeUps))
+                    now = time.monotonic()
                     screen.update(_table(snapshot, missed, faults[-3:]), refresh=True)
         except Interrupted as end:
             if end.signal_name != "SIGINT":
@@ -96,7 +100,12 @@ def _watch(rig: RigFile, model: AnyModel | None, seconds: float | None) -> None:
                 print(f"fault: {fault}")
         counted = sound.silence()
     limited = 0 if counted is None else _limited(counted.counters)
-    print(_summary(snapshot, missed, time.monotonic() - start, limited=limited))
+    print(_summary(snapshot, missed, now - start, limited=limited))
+
+
+def _since(before: WakeUps, now: WakeUps) -> WakeUps:
+    """What was counted in between."""
+    return type(now)(now.periods - before.periods, now.misses - before.misses)
 
 
 def _play_on(sound: VibrationOutput, model: AnyModel | None, faults: Sequence[str]) -> None:
@@ -160,7 +169,7 @@ def _callback(now: Snapshot) -> str:
 
 def _summary(now: Snapshot, bare: WakeUps, seconds: float, *, limited: int) -> str:
     return (
-        f"{seconds:.0f} s: {now.misses} of {now.blocks} blocks missed (a bare thread "
+        f"{seconds:.1f} s: {now.misses} of {now.blocks} blocks missed (a bare thread "
         f"{bare.misses} of {bare.periods} wake-ups), {now.stale_blocks} without a fresh hand, "
         f"{limited} samples at a limit; the callback {_callback(now)}"
     )

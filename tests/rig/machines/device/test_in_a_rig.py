@@ -122,7 +122,7 @@ def test_a_desk_rig_shows_its_wall_under_a_texture(
         rig_on = device_rig(tmp_path, device.address)
         with DeskRig(rig_on, override="a test") as rig:
             assert rig.simulated
-            assert str(rig.stated["HandFirmware"]).startswith("tactileq-cables 1.1")
+            assert str(rig.stated["HandFirmware"]).startswith("tactileq-cables 1.2")
             rig.arm()
             rig.present_model(planted_texture("PVC"))
             follow(2.0, rig.read, every_s=0.02)

@@ -10,8 +10,13 @@ import pytest
 from tactileq.benches.rendering.rivals import layered_texture
 from tactileq.modeling import InputError, Limits, Renderer, TextureModel
 from tactileq.modeling.vibrators.compensation import Compensation
-from tactileq.rig.machines.device.models import DEVICE_LIMITS, device_model
-from tactileq.rig.machines.device.registers import DeviceSource, DeviceStatus
+from tactileq.rig.machines.device.models import (
+    DEVICE_LIMITS,
+    UPLOAD_RANGES,
+    DeviceModel,
+    device_model,
+)
+from tactileq.rig.machines.device.registers import DeviceModelFault, DeviceSource, DeviceStatus
 from tactileq.rig.shared.wire.conversation import Block, DeviceRefused, Hello
 from tactileq.stimuli.planted.textures import planted_texture
 from tests.refusals import refused
@@ -120,10 +125,125 @@ def test_what_is_no_model_is_refused_and_the_one_before_stays(spoilt) -> None:  
 def test_a_wrong_hash_is_refused() -> None:
     talk = Talk()
     good = device_model(planted_texture("canvas"), HELLO)
-    with pytest.raises(DeviceRefused) as told:
+    with pytest.raises(DeviceRefused, match="hash") as told:
         talk.upload(good.data, good.hash ^ 1)
     assert told.value.status == DeviceStatus.MODEL
+    assert talk.number("ModelFault") == DeviceModelFault.HASH
     assert talk.number("ModelHash") == 0
+
+
+# Of one layer on a grid of 2 x 2 speeds and forces, as the page says.
+SMALL = struct.pack(
+    "<4s4B3I4x36d",
+    *(b"TQM1", 8, 1, 2, 2, 5, 300_000, 500),
+    *(5000, 10, 0.1, 0.5, 50, 50, 5, 4, 0.001, 1e-3, 240, 90, 0.5),
+    *(50, 200, 0.5, 2, 1, 0.01, 0.01),
+    *(4 * (0.1, 300, 50, 0.2)),
+)
+REALS = [*UPLOAD_RANGES][[*UPLOAD_RANGES].index("model_rate_hz") :]
+PLACES = {**{name: n for n, name in enumerate(REALS[:13])}, "speed_mm_s": 14, "force_n": 16}
+PLACES |= {"signs": 17, "slews": 18, "values": 23}
+
+
+def fault_of(data: bytes) -> DeviceModelFault:
+    """What a device has against an upload."""
+    talk, status = Talk(), DeviceStatus.OK
+    try:
+        talk.upload(data, DeviceModel(data).hash)
+    except DeviceRefused as refusal:
+        status = DeviceStatus(refusal.status)
+    fault = DeviceModelFault(talk.number("ModelFault"))
+    assert status == (DeviceStatus.MODEL if fault else DeviceStatus.OK)
+    assert (talk.number("ModelHash") != 0) == (fault == DeviceModelFault.NONE)
+    return fault
+
+
+def with_real(name: str, value: float) -> bytes:
+    """Of an axis a small number is its first, and any other its last."""
+    at = 24 + 8 * (PLACES[name] - (name in ("speed_mm_s", "force_n") and value < 0.1))
+    return SMALL[:at] + struct.pack("<d", value) + SMALL[at + 8 :]
+
+
+@pytest.mark.parametrize("name", REALS)
+def test_every_real_is_refused_outside_the_range_of_the_page_and_by_its_name(name: str) -> None:
+    of = UPLOAD_RANGES[name]
+    refusal = DeviceModelFault[name.upper()]
+    lowest, highest = float(of.low), float(of.high)
+    least = np.nextafter(lowest, np.inf) if of.above else lowest
+    most = np.nextafter(highest, -np.inf) if of.below else highest
+    for value in (least, most):
+        assert fault_of(with_real(name, value)) == DeviceModelFault.NONE, value
+    beyond = [np.nextafter(least, -np.inf), np.nextafter(most, np.inf), np.nan, np.inf, -np.inf]
+    for value in beyond:
+        assert fault_of(with_real(name, value)) == refusal, value
+
+
+@pytest.mark.parametrize(
+    ("at", "form", "value", "name"),
+    [
+        (0, "4s", b"TQM2", "HEAD"),
+        (4, "B", 4, "HEAD"),
+        (5, "B", 9, "LAYERS"),
+        (6, "B", 1, "GRID"),
+        (7, "B", 1, "GRID"),
+        (7, "B", 3, "SIZE"),
+        (8, "I", 0, "UPDATE_SAMPLES"),
+        (8, "I", 1000, "NONE"),
+        (8, "I", 1001, "UPDATE_SAMPLES"),
+        (12, "I", 0, "LONGEST"),
+        (16, "I", 0, "PAUSE"),
+        (16, "I", 1, "NONE"),
+    ],
+)
+def test_a_head_is_refused_by_its_part(at: int, form: str, value: object, name: str) -> None:
+    part = struct.pack(f"<{form}", value)
+    data = SMALL[:at] + part + SMALL[at + len(part) :]
+    assert fault_of(data) == DeviceModelFault[name]
+
+
+def test_what_ranges_alone_do_not_say_is_refused() -> None:
+    assert fault_of(SMALL[:20]) == DeviceModelFault.SIZE
+    rest = 24 + 8 * 20  # noise gain, frequency, bandwidth, gain
+    for place, value in ((0, -1e-9), (0, 1000.1), (1, 1e6 + 1), (2, np.nan), (3, -1000.1)):
+        at = rest + 8 * place
+        data = SMALL[:at] + struct.pack("<d", value) + SMALL[at + 8 :]
+        assert fault_of(data) == DeviceModelFault.VALUES
+    assert fault_of(with_real("speed_mm_s", struct.unpack_from("<d", SMALL, 24 + 8 * 13)[0])) == (
+        DeviceModelFault.SPEED_MM_S
+    )
+    without = SMALL[: 24 + 80] + struct.pack("<3d", 0, 0, 0) + SMALL[24 + 104 :]
+    assert fault_of(without) == DeviceModelFault.NONE
+
+
+def test_the_ranges_have_the_names_of_the_faults() -> None:
+    named = [fault.name.lower() for fault in DeviceModelFault]
+    assert [name for name in named if name in UPLOAD_RANGES] == list(UPLOAD_RANGES)
+    assert set(named) - set(UPLOAD_RANGES) == {"none", "hash", "head", "size"}
+
+
+@pytest.mark.parametrize(
+    ("limits", "facts"),
+    [(Limits(peak=50, rms=2, duration_s=60), ["peak", "50"]), (None, ["notch_hz", "2400"])],
+)
+def test_the_host_sends_nothing_that_the_device_refuses(
+    limits: Limits | None, facts: list[str]
+) -> None:
+    low = Compensation(rate_hz=5000.0, frequency_hz=2400.0, bandwidth_hz=90.0, height=3.0)
+    options = {"limits": limits} if limits else {"compensation": low}
+    with refused(InputError, expected=facts[0], got=facts[1]):
+        device_model(planted_texture("canvas"), HELLO, **options)  # type: ignore[arg-type]
+
+
+def test_a_model_is_no_source_before_there_is_one() -> None:
+    talk = Talk()
+    with pytest.raises(DeviceRefused) as told:
+        talk.write("Source", DeviceSource.MODEL)
+    assert told.value.status == DeviceStatus.STATE
+    assert talk.read("Source") == DeviceSource.NOTHING
+    talk.write("Source", DeviceSource.HOST)
+    good = device_model(planted_texture("canvas"), HELLO)
+    talk.upload(good.data, good.hash)
+    assert talk.write("Source", DeviceSource.MODEL) == DeviceSource.MODEL
 
 
 def test_a_model_that_does_not_fit_is_refused_on_both_sides() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import re
 import shutil
 import threading
 import time
@@ -207,6 +208,33 @@ def test_an_interrupted_plan_is_not_left_for_another(
     assert Counter(row["texture"] for row in rows_of(folder)) == {"oak": 4, "ash": 4}
 
 
+@pytest.mark.parametrize("finished", [False, True])
+def test_a_plan_goes_on_under_its_own_seed_only(tmp_path: Path, finished: bool) -> None:
+    def begin(seed: int | None, of: Plan | None = None) -> RecorderStore:
+        return RecorderStore(tmp_path / "oak", of or plan(), radius_mm=40.0, seed=seed)
+
+    run = run_of(tmp_path / "oak")
+    run.store = begin(3)
+    if finished:
+        run.run()
+    else:
+        with pytest.raises(KeyboardInterrupt):
+            run.run(_interrupt)
+    with refused(
+        InputError, names=[tmp_path / "oak", "--repeat"], expected="--seed 3", got=["4", "--seed 3"]
+    ):
+        begin(4)
+    assert len(begin(3).missing) == (0 if finished else 3)
+    begin(4, replace(plan(), repeat=2))
+    # A plan of an earlier version says of no seed.
+    path = tmp_path / "oak" / PLAN_NAME
+    path.write_text(path.read_text().replace('"seed": 3', '"seed": null'))
+    begin(4)
+    path.write_text(re.sub(r',\s*"seed": null', "", path.read_text()))
+    assert "seed" not in path.read_text()
+    begin(4)
+
+
 def _interrupt(_: object) -> None:
     raise KeyboardInterrupt
 
@@ -311,12 +339,12 @@ def test_a_file_that_appears_ends_the_record_once_it_is_whole(tmp_path: Path) ->
 
 @pytest.mark.parametrize(
     ("count", "rate_hz", "names"),
-    [(300, 1000.0, ["500", "300"]), (2000, 1000.0, ["clocks", "2.00"])],
+    [(468, 1000.0, ["500", "468", "lost"]), (2000, 1000.0, ["clocks", "2.00"])],
 )
 def test_files_too_short_or_longer_than_speed_was_held_are_refused(
     tmp_path: Path, count: int, rate_hz: float, names: list[str]
 ) -> None:
-    """The second is what a sensor at another rate than the file says gives."""
+    """The first has lost a frame; the second is of a sensor at another rate than the file says."""
     sensor = EvaluationFiles(tmp_path, rate_hz=rate_hz, axis="z", wait_s=5.0)
     sensor.begin(0.5)
     written(tmp_path / "a.csv", noise(count), rate_hz=rate_hz)
@@ -334,6 +362,8 @@ def test_the_researcher_is_told_when_to_save_and_a_bad_file_is_an_attempt(tmp_pa
     files = iter([("a.csv", loud), ("b.csv", noise(300))])
 
     def tell(sentence: str) -> None:
+        if "save" not in sentence:
+            return
         told.append(sentence)
         name, samples = next(files)
         threading.Timer(0.35, written, (tmp_path / "adcm" / name, samples), kwargs).start()
@@ -362,7 +392,8 @@ def test_the_researcher_is_told_when_to_save_and_a_bad_file_is_an_attempt(tmp_pa
 
 
 def test_a_file_that_is_overwritten_counts_and_two_are_refused(tmp_path: Path) -> None:
-    sensor = EvaluationFiles(tmp_path, rate_hz=1000.0, axis="z", wait_s=5.0)
+    told: list[str] = []
+    sensor = EvaluationFiles(tmp_path, rate_hz=1000.0, axis="z", wait_s=5.0, tell=told.append)
     written(tmp_path / "DATA.CSV", noise(300, seed=1), rate_hz=1000.0)
     (tmp_path / "gone.csv").symlink_to(tmp_path / "nowhere")
     sensor.begin(0.2)
@@ -377,6 +408,8 @@ def test_a_file_that_is_overwritten_counts_and_two_are_refused(tmp_path: Path) -
     held(sensor)
     with refused(SensorRefused, got=["a.csv", "b.csv"]):
         sensor.samples((100.0, 1.0))
+    (noted,) = (sentence for sentence in told if "lost" in sentence)
+    assert "DATA.CSV" in noted
 
 
 def test_no_file_and_no_folder_are_said(tmp_path: Path) -> None:
@@ -440,6 +473,7 @@ def test_clocks_of_sensor_and_wire_that_disagree_are_refused(
 def test_clipping_gaps_and_a_card_that_is_gone_are_refused(tmp_path: Path) -> None:
     for name, value, said in (
         ("level", 1.0, "full scale"),
+        ("level", 0.0, "change"),
         ("lost", True, "gap"),
         ("running", False, "sound card"),
     ):

@@ -234,6 +234,40 @@ def test_time_in_another_unit_is_noticed(
     assert import_csv([named], [LABEL]).recordings[0].rate_hz == pytest.approx(rate_hz)
 
 
+def test_seconds_that_may_be_milliseconds_are_refused_with_both_rates(tmp_path: Path) -> None:
+    """As the accelerometer's evaluation tool is said to write, the first time an odd one."""
+    rate_hz = 22_704.0
+    path, count = tmp_path / "a.csv", round(0.205 * rate_hz)
+    samples = np.random.default_rng(1).normal(0, 0.2, count)
+    time_ms = (np.arange(count) / rate_hz * 1e3).round(6)
+    time_ms[0] = 0.000011
+    write_csv(path, "Time(s),az(g)", np.vstack([time_ms, samples]))
+    with refused(InputError, names="a.csv", got=["'Time(s)'", "in s", "in ms"]) as error:
+        import_csv([path], [LABEL], axis="z")
+    offered = [float(rate) for rate in re.findall(r"([\d.]+) Hz with times", str(error.value))]
+    assert offered == pytest.approx([rate_hz / 1000, rate_hz], rel=1e-4)
+    for given in offered:
+        taken = import_csv_file(path, LABEL, axis="z", rate_hz=given)
+        assert not taken.doubts
+        assert taken.recording.rate_hz == given
+        assert np.array_equal(taken.recording.samples, samples)
+        told = [sentence for sentence in taken.warnings if "'Time(s)'" in sentence]
+        assert len(told) == (given > 1000)
+    with refused(InputError, got=["3000 Hz", "in s", "in ms"]):
+        import_csv([path], [LABEL], axis="z", rate_hz=3000)
+
+
+def test_a_slow_log_that_can_be_nothing_else_is_only_told_of(tmp_path: Path) -> None:
+    """Of a telephone: 2 s at 100 Hz would be 2 ms."""
+    path = tmp_path / "a.csv"
+    values = np.random.default_rng(1).normal(0, 0.2, 200)
+    write_csv(path, "Time (s),z (g)", np.vstack([np.arange(200) / 100, values]))
+    found = import_csv_file(path, LABEL)
+    assert found.recording.rate_hz == pytest.approx(100)
+    assert not found.doubts
+    check_refusal(found.warnings[0], got=["100 Hz", "--rate"])
+
+
 def test_decimal_commas_between_semicolons(tmp_path: Path, axes: NDArray[np.float64]) -> None:
     path = write_csv(tmp_path / "a.csv", "time_s;x_g;y_g;z_g", with_time(axes), delimiter=";")
     with_points = import_csv([path], [LABEL], axis="z")

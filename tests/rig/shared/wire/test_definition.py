@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import copy
+import hashlib
+import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +16,11 @@ from hypothesis import strategies as st
 
 from tactileq.modeling import InputError
 from tactileq.rig.machines.device.definition import DEVICE
+from tactileq.rig.machines.recorder.definition import RECORDER
 from tactileq.rig.shared.wire.definition import Definition
 from tests.refusals import refused
 
+DOCS = Path(__file__).parents[4] / "docs"
 FILE = Path(__file__).parents[4] / "rig/machines/device/device.yml"
 VALUES = yaml.safe_load(FILE.read_text(encoding="utf-8"))
 
@@ -83,6 +88,28 @@ def test_what_both_must_agree_on_changes_the_hash(tmp_path: Path) -> None:
         changed("firmwareVersion", to="9.9"),
     ):
         assert loaded(tmp_path, values).schema_hash != DEVICE.schema_hash
+
+
+def test_the_pages_give_the_identity_and_how_the_hash_is_made() -> None:
+    said = json.loads((DOCS / "device/vectors.json").read_text(encoding="utf-8"))
+    text = "".join(f"{line}\n" for line in said["schema"])
+    assert hashlib.sha256(text.encode()).digest()[:8] == DEVICE.schema_hash.to_bytes(8, "big")
+    for row in (
+        "schema\t1",
+        "device\ttactileq-cables\t29012\t1.2",
+        "register\t0\tWhoAmI\tU16\t1\tr\talways\t\t0:65535",
+        "register\t27\tTensionRange\tFloat\t2\trw\tidle\tN\t0:100\t0:100",
+        "mask\tSource\tvalues\t0=NOTHING\t1=MODEL\t2=HOST",
+    ):
+        assert row in said["schema"]
+    for page, of in (("device-registers.md", DEVICE), ("recorder-registers.md", RECORDER)):
+        table = (DOCS / page).read_text(encoding="utf-8")
+        values = dict(
+            re.findall(r"^\| \d \| `(\w+)` \| U\d+ \| read \| (\w+) \|", table, re.MULTILINE)
+        )
+        assert int(values["WhoAmI"]) == of.who_am_i
+        assert divmod(int(values["FirmwareVersion"]), 256) == of.firmware_version
+        assert int(values["SchemaHash"], 16) == of.schema_hash
 
 
 @given(st.data())
