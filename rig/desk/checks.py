@@ -62,7 +62,8 @@ def check_rig(
     Raises
     ------
     InputError
-        For a p95 of the latency above 40 ms without an override; for no calibration, one that does
+        For a p95 of the latency above 40 ms, or one of another card, block or hand, without an
+        override; for no calibration, one that does
         not fit this rig, or an older one than allowed; for an assumed force where it must be
         measured; for a window's pointer as the hand in a study; for limits that the card cannot
         play; for a wall that the device cannot render.
@@ -185,6 +186,7 @@ def _check_on_device(rig: RigFile, model: AnyModel) -> None:
 def _check_latency(rig: RigFile, override: str | None) -> None:
     if rig.latency is None or override is not None:
         return
+    rig.check_latency()
     p95 = rig.latency.p95_ms.value
     if p95 > HIGHEST_LATENCY_MS:
         raise InputError(

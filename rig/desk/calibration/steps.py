@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import datetime
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -147,7 +148,7 @@ def level_figures(
         "calibration.date": today,
         "calibration.rig": rig.rig.name,
         "calibration.serials": list(rig.rig.serials),
-        "calibration.rests_on": [f"{name} = {value}" for name, value in basis.items()],
+        "calibration.rests_on": _lines(basis),
     }
 
 
@@ -180,6 +181,7 @@ def latency_figures(
         "latency.median_ms": Figure(summary.median_ms, "ms", False, source),
         "latency.p95_ms": Figure(summary.p95_ms, "ms", False, source),
         "latency.measured_on": today,
+        "latency.rests_on": _lines(rig.latency_basis),
     }
 
 
@@ -193,6 +195,10 @@ def save_vibrator(rig: RigFile, vibrator: Vibrator, name: str) -> dict[str, obje
     if rig.calibration is not None and rig.calibration.rests_on is None:
         named["calibration.rests_on"] = [f"vibrator.file = {rig.level_basis['vibrator.file']}"]
     return named
+
+
+def _lines(basis: Mapping[str, str]) -> list[str]:
+    return [f"{name} = {value}" for name, value in basis.items()]
 
 
 def _note(rig: RigFile) -> str:

@@ -250,6 +250,46 @@ class RigFile(DescribedFile):
             }
         return {name: _in_words(value) for name, value in basis.items()}
 
+    @property
+    def latency_basis(self) -> dict[str, str]:
+        """What the time from the hand to the vibration rests on: keys and their values."""
+        sound, hand = self.sound, self.hand
+        basis: dict[str, object] = {
+            "sound.device": sound.device,
+            "sound.rate_hz": sound.rate_hz,
+            "sound.block": sound.block,
+            "hand.kind": hand.kind,
+            "hand.device": hand.device,
+            "hand.filter_delay_s": hand.filter_delay_s,
+        }
+        return {name: _in_words(value) for name, value in basis.items()}
+
+    def check_latency(self) -> None:
+        """Refuse a latency of another card, block or hand; none is no claim.
+
+        Raises
+        ------
+        InputError
+        """
+        if self.latency is not None:
+            self._check_basis(
+                self.latency.rests_on or (),
+                self.latency_basis,
+                "latency was measured",
+                "measure the latency again (tactileq rig latency)",
+            )
+
+    def _check_basis(
+        self, lines: Sequence[str], now: Mapping[str, str], done: str, again: str
+    ) -> None:
+        then = dict(line.partition(" = ")[::2] for line in lines)
+        changed = [name for name, was in then.items() if now.get(name) != was]
+        if changed:
+            raise InputError(
+                f"expected {_listed(changed, then)} in {self.path}, as when the {done}, got "
+                f"{_listed(changed, now)}; {again}, or undo the change."
+            )
+
     def check_calibration(self) -> None:
         """Refuse a calibration that is not that of this rig as it is now; none is no claim.
 
@@ -268,17 +308,15 @@ class RigFile(DescribedFile):
                 f"{self.path}, got that of {_named(done.rig, done.serials)}; calibrate it "
                 "(tactileq rig calibrate level)."
             )
-        then = dict(line.partition(" = ")[::2] for line in done.rests_on or ())
-        now = self.level_basis
+        lines: Sequence[str] = done.rests_on or ()
         if self.accelerometer is None:  # it may go once the level is known
-            now |= {name: was for name, was in then.items() if name.startswith("accelerometer.")}
-        changed = [name for name, was in then.items() if now.get(name) != was]
-        if changed:
-            raise InputError(
-                f"expected {_listed(changed, then)} in {self.path}, as when the level was "
-                f"calibrated, got {_listed(changed, now)}; calibrate the level again (tactileq rig "
-                "calibrate level), or undo the change."
-            )
+            lines = [line for line in lines if not line.startswith("accelerometer.")]
+        self._check_basis(
+            lines,
+            self.level_basis,
+            "level was calibrated",
+            "calibrate the level again (tactileq rig calibrate level)",
+        )
 
     @property
     def renderer(self) -> DeviceSection | None:

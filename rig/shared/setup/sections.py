@@ -290,6 +290,16 @@ class LatencySection(FileSection):
         key("its 95th percentile; above 40 ms the rig is refused", unit="ms", ge=_LEAST, le=10000),
     ]
     measured_on: Annotated[datetime.date, key("when")] | None = None
+    rests_on: (
+        Annotated[
+            tuple[Name, ...],
+            key(
+                "the keys of card and hand on which it "
+                "[rests](rig-file.md#what-the-level-rests-on), with their values at that time; without it their changes go unnoticed"
+            ),
+        ]
+        | None
+    ) = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -183,6 +184,12 @@ def test_latency_is_written_with_its_reason(tmp_path: Path) -> None:
     assert rig.latency.p95_ms.value == 50.0
     assert "accepted: a pilot" in rig.latency.median_ms.source
     assert rig.latency.measured_on == TODAY
+    rig.check_latency()
+    for section, change in (("sound", {"block": 256}), ("hand", {"device": "other"})):
+        other = replace(rig, **{section: replace(getattr(rig, section), **change)})
+        with refused(InputError, expected=f"{section}.", got=next(iter(change.values()))):
+            other.check_latency()
+    replace(rig, latency=replace(rig.latency, rests_on=None)).check_latency()  # of an older file
 
 
 def test_pressure_is_read_as_a_share_and_fitted(tmp_path: Path) -> None:
