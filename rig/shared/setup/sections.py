@@ -295,7 +295,8 @@ class LatencySection(FileSection):
             tuple[Name, ...],
             key(
                 "the keys of card and hand on which it "
-                "[rests](rig-file.md#what-the-level-rests-on), with their values at that time; without it their changes go unnoticed"
+                "[rests](rig-file.md#what-the-level-rests-on), with their values at that time; "
+                "without it their changes go unnoticed"
             ),
         ]
         | None
