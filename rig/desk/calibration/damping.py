@@ -64,7 +64,7 @@ class Run:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Estimate:
+class Bounded:
     """Mean over runs, and half of its 95 % interval."""
 
     value: float
@@ -97,19 +97,19 @@ class Damping:
 
     Parameters
     ----------
-    damping_n_s_per_m, dry_n : Estimate
+    damping_n_s_per_m, dry_n : Bounded
         Viscous damping along the wall's normal, and dry (Coulomb) friction beside it.
-    mass_kg, delay_ms : Estimate
+    mass_kg, delay_ms : Bounded
         The time is that from a reading to the force that answers it, without the half period for
         which a servo holds it.
     coherence : float
         Least share of a run's motion that follows from the force.
     """
 
-    damping_n_s_per_m: Estimate
-    dry_n: Estimate
-    mass_kg: Estimate
-    delay_ms: Estimate
+    damping_n_s_per_m: Bounded
+    dry_n: Bounded
+    mass_kg: Bounded
+    delay_ms: Bounded
     coherence: float
 
     @property
@@ -313,7 +313,7 @@ def _dryness(run: Run) -> float:
     return float(np.abs(speed).mean() / max(1e-12, float((speed**2).mean())))
 
 
-def _separated(found: Floats, dryness: Floats) -> tuple[Estimate, Estimate]:
+def _separated(found: Floats, dryness: Floats) -> tuple[Bounded, Bounded]:
     """Viscous damping and dry friction: intercept and slope over the runs' dryness."""
     from scipy import stats
 
@@ -323,17 +323,17 @@ def _separated(found: Floats, dryness: Floats) -> tuple[Estimate, Estimate]:
     variance = float(np.sum((found - rows @ values) ** 2)) / left
     halves = stats.t.ppf(0.975, left) * np.sqrt(variance * np.diag(np.linalg.pinv(rows.T @ rows)))
     viscous, dry = (
-        Estimate(value=float(v), half=float(h)) for v, h in zip(values, halves, strict=True)
+        Bounded(value=float(v), half=float(h)) for v, h in zip(values, halves, strict=True)
     )
     return viscous, dry
 
 
-def _mean(values: Floats) -> Estimate:
+def _mean(values: Floats) -> Bounded:
     """Mean of independent values, with Student's interval."""
     from scipy import stats
 
     half = float(stats.t.ppf(0.975, values.size - 1) * values.std(ddof=1) / sqrt(values.size))
-    return Estimate(value=float(values.mean()), half=half)
+    return Bounded(value=float(values.mean()), half=half)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -43,7 +43,8 @@ class ForceSection(FileSection):
         Figure,
         key(
             "viscous damping of the device itself, on which the "
-            "[largest stiffness](force-device.md#stiffness) rests; `tactileq rig damping` writes it",
+            "[largest stiffness](force-device.md#stiffness) rests; "
+            "`tactileq rig damping` writes it",
             unit="N·s/m",
             ge=0,
             le=1000,

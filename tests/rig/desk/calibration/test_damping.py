@@ -9,8 +9,8 @@ from tactileq.modeling import InputError
 from tactileq.modeling.arrays import Floats
 from tactileq.rig.desk.calibration.damping import (
     SOFT_N_PER_MM,
+    Bounded,
     Damping,
-    Estimate,
     Run,
     damping_of,
     soft_wall_n_per_mm,
@@ -65,7 +65,7 @@ def check_covered(found: list[Damping], tools: Tools, *, share: float) -> None:
     assert np.mean([one.delay_ms.low <= late_ms <= one.delay_ms.high for one in found]) >= share
 
 
-def check_estimates(found: list[Estimate], truths: Floats, *, share: float) -> None:
+def check_estimates(found: list[Bounded], truths: Floats, *, share: float) -> None:
     values = np.array([one.value for one in found])
     assert values == pytest.approx(truths, rel=0.1)
     assert np.mean(np.abs(values - truths) <= [one.half for one in found]) >= share
@@ -115,5 +115,5 @@ def test_the_wall_is_as_soft_as_the_device_needs() -> None:
 
 
 def test_a_bound_is_written_with_the_digits_that_it_has() -> None:
-    assert str(Estimate(value=2.0132, half=0.022)) == "2.013 (95 % 1.991 to 2.035)"
-    assert str(Estimate(value=12.0, half=3.0)) == "12.0 (95 % 9.0 to 15.0)"
+    assert str(Bounded(value=2.0132, half=0.022)) == "2.013 (95 % 1.991 to 2.035)"
+    assert str(Bounded(value=12.0, half=3.0)) == "12.0 (95 % 9.0 to 15.0)"
