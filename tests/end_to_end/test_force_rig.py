@@ -6,6 +6,7 @@ The device is the stand-in, so everything here is simulated.
 from __future__ import annotations
 
 import os
+import re
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -100,6 +101,58 @@ def test_a_surface_that_does_not_give_way_is_no_spring(
     assert done.returncode == 1
     assert "expected a surface that gives way like a spring" in done.stderr
     assert (tmp_path / "rig.toml").read_text() == before
+
+
+@pytest.mark.long("a whole measurement in real time")
+def test_a_virtual_wall_beside_a_real_surface_is_not_taken_for_as_stiff(
+    main: Any, tmp_path: Path, force_device: StandIn, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tactileq.rig.desk.calibration.stiffness.PRESS_S", 1.5)
+    monkeypatch.setattr("tactileq.rig.machines.force.standin.CARRIED_S", 0.7)
+    let_go = StandIn.let_go
+    monkeypatch.setattr(StandIn, "let_go", lambda self, *, on_real: let_go(self, on_real=True))
+    before = force_rig(tmp_path).path.read_text()
+    done = main("rig", "stiffness", "--picture", "stiffness.png")
+    assert done.returncode == 1
+    told = " ".join(done.stderr.split())
+    assert re.search(r"expected about 0\.99\d N/mm .*got (1\.9\d|2) N/mm", told)
+    assert (tmp_path / "rig.toml").read_text() == before
+    assert not (tmp_path / "stiffness.png").exists()
+
+
+@pytest.mark.long("a whole measurement in real time")
+def test_the_damping_of_the_device_is_found_and_its_least_written(
+    main: Any, tmp_path: Path, force_device: StandIn, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tactileq.rig.machines.force.standin.CARRIED_S", 0.7)
+    force_device.fields.friction = 1.3
+    file = force_rig(tmp_path).path
+    done = main("rig", "damping")
+    assert done.returncode == 0, done.stderr
+    assert re.search(r"^mass: 0\.(20|199)", done.stdout, flags=re.MULTILINE)
+    device = RigFile.load(file).force_device
+    assert device is not None
+    assert 0.9 * 1.3 <= device.damping.value <= 1.3
+    assert not device.damping.assumed
+    assert "commanded" in device.damping.source
+    assert "simulated" in device.damping.source
+    assert force_device.fields.most_n <= 1.0
+    assert max(abs(force) for force in force_device.fields.force) == 0
+
+
+@pytest.mark.long("a whole measurement in real time")
+def test_a_tool_that_is_held_shows_no_damping_of_the_device(
+    main: Any, tmp_path: Path, force_device: StandIn, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tactileq.rig.desk.calibration.damping.RUNS", 4)
+    monkeypatch.setattr(StandIn, "let_go", lambda *_, **__: None)
+    force_device.fields.stroke = 0.0
+    before = force_rig(tmp_path).path.read_text()
+    done = main("rig", "damping")
+    assert done.returncode == 1
+    assert "let go of the tool" in " ".join(done.stderr.split())
+    assert (tmp_path / "rig.toml").read_text() == before
+    assert max(abs(force) for force in force_device.fields.force) == 0
 
 
 def test_a_pose_is_written_from_three_points(

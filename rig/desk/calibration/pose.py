@@ -38,8 +38,8 @@ def touching_hand(rig: RigFile, live: Live) -> ForceHand:
     if rig.own_device is not None:
         raise InputError(
             f"expected a force device that can press, got [device] in {rig.path}, whose cables "
-            "only pull and whose wall lies where its firmware says; measure with a spring balance, "
-            "and write real_surface.stiffness yourself."
+            "only pull and whose wall lies where its firmware says; measure by other means (a "
+            "spring balance for real_surface.stiffness), and write it yourself."
         )
     if settings is None:
         raise InputError(

@@ -21,9 +21,10 @@ SHARE = 0.6  # of the largest force of the device
 LEAST_SHARE = 0.2  # of the largest press: below, the tool may not yet rest on the surface
 LEAST_MM = 0.05
 LEAST_FIT = 0.9
+TOLERANCE = 0.1  # of a wall's stiffness, beside what is measured inexactly
 _EVERY_S = 0.002
 # Nothing to be felt: for the real surface.
-_NO_WALL = Wall(height_mm=-LARGEST_MM, stiffness_n_per_mm=1e-3, width_mm=1.0, length_mm=1.0)
+NO_WALL = Wall(height_mm=-LARGEST_MM, stiffness_n_per_mm=1e-3, width_mm=1.0, length_mm=1.0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -36,6 +37,8 @@ class Pressed:
         Commanded force into the surface, and how far the tool went down since it rested on it.
     stiffness_n_per_mm, friction_n : float
         Of the surface; half of the difference between loading and unloading.
+    uncertainty_n_per_mm : float
+        Of the stiffness: half of the difference between those of loading and unloading.
     simulated : bool
     """
 
@@ -43,6 +46,7 @@ class Pressed:
     depth_mm: Floats
     stiffness_n_per_mm: float
     friction_n: float
+    uncertainty_n_per_mm: float
     simulated: bool
 
 
@@ -73,8 +77,8 @@ def press_on(
     """
     hand.arm()
     live.heartbeat()
-    hand.show(_NO_WALL)
-    wall, start_mm = _NO_WALL, _NO_WALL.height_mm - hand.control.depth_mm
+    hand.show(NO_WALL)
+    wall, start_mm = NO_WALL, NO_WALL.height_mm - hand.control.depth_mm
     if wall_n_per_mm is not None:
         hand.hide()
         wall = Wall(height_mm=start_mm, stiffness_n_per_mm=wall_n_per_mm)
@@ -130,5 +134,23 @@ def pressed(force_n: Floats, depth_mm: Floats, *, simulated: bool) -> Pressed:
         depth_mm=depth_mm,
         stiffness_n_per_mm=1 / compliance,
         friction_n=abs(fits[1][1] - fits[0][1]) / 2 / compliance,
+        uncertainty_n_per_mm=abs(fits[1][0] - fits[0][0]) / 2 / compliance**2,
         simulated=simulated,
+    )
+
+
+def check_virtual(virtual: Pressed, *, commanded_n_per_mm: float) -> None:
+    """Refuse a virtual wall that is not as stiff as was commanded: something else bears the tool.
+
+    Raises
+    ------
+    InputError
+    """
+    found, likely = virtual.stiffness_n_per_mm, virtual.uncertainty_n_per_mm
+    if abs(found - commanded_n_per_mm) <= TOLERANCE * commanded_n_per_mm + likely:
+        return
+    raise InputError(
+        f"expected about {commanded_n_per_mm:.3g} N/mm of the virtual wall, as commanded, got "
+        f"{found:.3g} N/mm; the tool rests on something else, too, such as the real surface, or "
+        "somebody holds it: hold it higher in the air, let go, and begin again."
     )

@@ -24,13 +24,13 @@ _WORST_BAUD = 0.02
 
 
 @dataclass(frozen=True)
-class QemuBoard:
-    """A micro-controller that QEMU emulates.
+class Board:
+    """A micro-controller that the firmware is compiled for.
 
     Parameters
     ----------
     machine : str
-        QEMU's name.
+        QEMU's name; empty where QEMU has none.
     name : str
         Of the files in `boards/`.
     clock_hz : float
@@ -65,14 +65,11 @@ class Machine:
     compiled: Callable[[], Any]
 
 
-BOARDS: dict[str, QemuBoard] = {
-    "m7": QemuBoard(
-        "mps2-an500",
-        "mps2",
-        25e6,
-        ("-mcpu=cortex-m7", "-mfpu=fpv5-d16", "-DTQ_REAL=double", "-DTQ_NUMBER=double"),
-    ),
-    "stm32": QemuBoard(
+_DOUBLE = ("-mcpu=cortex-m7", "-mfpu=fpv5-d16", "-DTQ_REAL=double", "-DTQ_NUMBER=double")
+BOARDS: dict[str, Board] = {
+    "m7": Board("mps2-an500", "mps2", 25e6, _DOUBLE),
+    "f767": Board("", "stm32f767", 54e6, _DOUBLE),
+    "stm32": Board(
         "netduinoplus2",
         "stm32f405",
         84e6,
@@ -104,12 +101,14 @@ def check_baud(kind: Kind, baud: int) -> None:
 
 
 def build_firmware(
-    kind: Kind, machine: Machine, file: Path, *, baud: int, simulated: bool = True
+    kind: str, machine: Machine, file: Path, *, baud: int, simulated: bool = True
 ) -> Path:
     """Compile the firmware of a board.
 
     Parameters
     ----------
+    kind : str
+        One of `BOARDS`.
     file : Path
         To be written (ELF).
     simulated : bool
@@ -132,7 +131,7 @@ def build_firmware(
     command += ["-DTQ_SIMULATED"] * simulated + [f"-D{macro}" for macro in machine.macros]
     command += [f"-I{folder}" for folder in folders]
     command += ["-ffunction-sections", "-Wl,--gc-sections", "-nostartfiles", "-specs=nano.specs"]
-    command += ["-T", str(_HERE / "boards" / f"{board.name}.ld")]
+    command += [f"-L{_HERE / 'boards'}", "-T", str(_HERE / "boards" / f"{board.name}.ld")]
     command += [str(_HERE / "boards" / f"{board.name}.c"), str(_HERE / "firmware.c")]
     done = subprocess.run(
         [*command, "-o", str(file), "-lm"], capture_output=True, text=True, check=False

@@ -15,6 +15,7 @@ static tq_simulated simulated;
 #endif
 static uint8_t received[RECEIVED], sent[SENT];
 static volatile uint32_t received_in, received_out, sent_in, sent_out;
+static volatile int turned; /* whether the main loop went round since the watchdog was last fed */
 
 void firmware_byte(uint8_t byte)
 {
@@ -53,6 +54,9 @@ void firmware_tick(void)
     next = tq_device_pace(&device);
     if (next != pace)
         board_pace(pace = next);
+    /* Here alone, and once in a turn of the main loop: where either hangs, or starves the other, none is fed. */
+    if (turned)
+        turned = 0, board_watchdog();
 }
 
 static int written(void *context, int output, tq_number value)
@@ -116,6 +120,7 @@ int firmware_main(void)
             tq_device_received(&device, &byte, 1);
         }
         tq_device_poll(&device);
+        turned = 1;
         board_lock();
         if (received_in == received_out)
             board_wait();

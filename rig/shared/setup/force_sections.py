@@ -43,14 +43,22 @@ class ForceSection(FileSection):
         Figure,
         key(
             "viscous damping of the device itself, on which the "
-            "[largest stiffness](force-device.md#stiffness) rests",
+            "[largest stiffness](force-device.md#stiffness) rests; "
+            "`tactileq rig damping` writes it",
             unit="N·s/m",
             ge=0,
             le=1000,
         ),
     ] = field(default=_assumed(0.5, "N·s/m"))
     delay_ms: Annotated[
-        Figure, key("from a reading to the force that answers it", unit="ms", ge=0, le=20)
+        Figure,
+        key(
+            "from a reading to the force that answers it; `tactileq rig damping` writes it if it "
+            "is known well enough",
+            unit="ms",
+            ge=0,
+            le=20,
+        ),
     ] = field(default=_assumed(1.0, "ms"))
     most_n: Annotated[Figure, key("largest force", unit="N", ge=0.01, le=40)] = field(
         default=_assumed(5.0, "N")

@@ -6,6 +6,7 @@ import typer
 
 from tactileq.commands.rig.calibrate import rig_calibrate
 from tactileq.commands.rig.check import rig_check
+from tactileq.commands.rig.damping import rig_damping
 from tactileq.commands.rig.device import rig_device
 from tactileq.commands.rig.latency import rig_latency
 from tactileq.commands.rig.monitor import rig_monitor
@@ -26,6 +27,7 @@ rig.command("calibrate")(rig_calibrate)
 rig.command("latency")(rig_latency)
 rig.command("range")(rig_range)
 rig.command("pose")(rig_pose)
+rig.command("damping")(rig_damping)
 rig.command("stiffness")(rig_stiffness)
 rig.command("play")(rig_play)
 rig.command("twin")(rig_twin)

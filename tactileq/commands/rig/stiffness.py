@@ -37,7 +37,7 @@ def rig_stiffness(
     from tactileq.analysis.figures.stiffness import figure_stiffness
     from tactileq.analysis.page.saving import DOTS_PER_INCH, save_figure
     from tactileq.rig.desk.calibration.pose import touching_hand
-    from tactileq.rig.desk.calibration.stiffness import SHARE, press_on
+    from tactileq.rig.desk.calibration.stiffness import SHARE, check_virtual, press_on
     from tactileq.rig.desk.walls import largest_of
     from tactileq.rig.shared.live.memory import Live
     from tactileq.rig.shared.setup.figures import Figure
@@ -54,8 +54,10 @@ def rig_stiffness(
             )
         found: list[Pressed] = []
         limit = largest_of(loaded)
+        ask("Hold the tool in the air", loaded, on_real=False)
+        hand.arm()  # there: on a hard surface it would not give way to the small force after it
         for place in ("Rest the tool on the real surface", "Hold the tool in the air above it"):
-            _ask(place, loaded)
+            ask(place, loaded, on_real="real" in place)
             wall = found[0].stiffness_n_per_mm if found else None
             if wall is not None and wall > limit:
                 print(
@@ -75,11 +77,13 @@ def rig_stiffness(
                     )
                 )
     real, virtual = found
+    assert wall is not None
     for name, one in (("real surface", real), ("virtual wall", virtual)):
         print(
             f"{name}: {one.stiffness_n_per_mm:.3f} N/mm up to {one.force_n.max():.1f} N, friction "
             f"{one.friction_n:.2f} N"
         )
+    check_virtual(virtual, commanded_n_per_mm=wall)
     if picture is not None:
         save_figure(figure_stiffness(real, virtual), picture, dpi=DOTS_PER_INCH)
         print(f"force against depth: {picture}")
@@ -91,12 +95,12 @@ def rig_stiffness(
     print(f"real_surface.stiffness: {loaded.path}")
 
 
-def _ask(place: str, rig: RigFile) -> None:
+def ask(place: str, rig: RigFile, *, on_real: bool) -> None:
     """Have the tool put there and let go; the stand-in's hand does both by itself."""
     if rig.force_device is not None and rig.force_device.simulated:
         from tactileq.rig.machines.force.standin import StandIn, device_path
 
         with StandIn(device_path()) as device:
-            device.let_go(on_real="real" in place)
+            device.let_go(on_real=on_real)
         return
     typer.prompt(f"{place}, let go, then Enter", default="", show_default=False)

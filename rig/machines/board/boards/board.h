@@ -30,6 +30,9 @@ void board_wait(void);
 void board_pace(int ticks);
 /* Clocks since the tick was due; 0 where nothing counts them. */
 uint32_t board_clock(void);
+/* Feeds the watchdog, which board_begin started: unfed for 50 ms at most, it resets the processor, whose pins then
+   float, so that a pull-down on the drivers' enable line takes the current away. It may not bite before 10 ms. */
+void board_watchdog(void);
 
 /* --- To be called -------------------------------------------------------------------------------- */
 

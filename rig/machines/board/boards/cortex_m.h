@@ -14,6 +14,7 @@
 #define INTERRUPTS_ON(number) REGISTER(0xE000E100 + 4 * ((number) / 32)) = 1u << ((number) % 32)
 #define TICK_PRIORITY REGISTER(0xE000ED20)
 #define COPROCESSORS REGISTER(0xE000ED88)
+#define BARRIER() __asm volatile("dsb\nisb" : : : "memory")
 
 extern uint32_t data_source[], data_begin[], data_end[], bss_begin[], bss_end[];
 void stack_top(void); /* an address, not a function */
@@ -23,7 +24,7 @@ void start(void)
 {
     uint32_t *to, *from = data_source;
     COPROCESSORS |= 0xFu << 20; /* the floating-point unit */
-    __asm volatile("dsb\nisb");
+    BARRIER();
     for (to = data_begin; to < data_end;)
         *to++ = *from++;
     for (to = bss_begin; to < bss_end;)
@@ -31,7 +32,7 @@ void start(void)
     firmware_main();
 }
 
-/* A fault of the processor: every output off, and there it stays. */
+/* A fault of the processor: every output off, and there it stays until the watchdog starts it anew. */
 static void crashed(void)
 {
     int n;

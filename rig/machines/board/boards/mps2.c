@@ -1,4 +1,4 @@
-/* ARM's board MPS2 with a Cortex-M7 (AN500), as QEMU knows it: an UART, and no motors.
+/* ARM's board MPS2 with a Cortex-M7 (AN500), as QEMU knows it: an UART, a watchdog, and no motors.
 
    Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
 
@@ -13,6 +13,7 @@ enum { HZ = 25000000 };
 #define UART_CONTROL REGISTER(0x40004008)
 #define UART_INTERRUPT REGISTER(0x4000400C)
 #define UART_DIVISOR REGISTER(0x40004010)
+#define WATCHDOG(offset) REGISTER(0x40008000 + (offset)) /* CMSDK */
 
 static int sending;
 
@@ -47,6 +48,13 @@ void board_begin(tq_board *board)
     INTERRUPTS_ON(0);
     INTERRUPTS_ON(1);
     begin_ticks(HZ);
+    WATCHDOG(0x00) = HZ; /* a second, since the computer that emulates it may be late */
+    WATCHDOG(0x08) = 3;  /* after the first one `crashed`, by the NMI, after the next one a reset */
+}
+
+void board_watchdog(void)
+{
+    WATCHDOG(0x0C) = 1; /* counts from the beginning, and takes the NMI back */
 }
 
 int board_write(int output, tq_number value)

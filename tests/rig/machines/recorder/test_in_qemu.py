@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 
-from tactileq.rig.machines.board.emulating import build_firmware
 from tactileq.rig.machines.board.virtual import TICK_HZ
 from tactileq.rig.machines.recorder.definition import RECORDER
 from tactileq.rig.machines.recorder.driver import DriverRecord, LinkedWire, Recorder, RecordRefused
@@ -157,11 +156,3 @@ def test_instructions_are_those_of_the_page(emulator: BuiltEmulator) -> None:
     for name, count in counted.items():
         assert count == pytest.approx(stated[name], rel=BAND)
         assert count < STM32_HZ / TICK_HZ
-
-
-def test_firmware_for_motors_and_encoders_of_an_stm32_is_compiled(tmp_path: Path) -> None:
-    """It is linked, too; nothing ran it."""
-    file = build_firmware(
-        "stm32", SURFACE_RECORDER, tmp_path / "recorder.elf", baud=1_000_000, simulated=False
-    )
-    assert file.read_bytes().startswith(b"\x7fELF")
