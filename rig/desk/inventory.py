@@ -36,7 +36,8 @@ from tactileq.rig.devices.sound.devices import (
 )
 from tactileq.rig.machines.force.dhd import UNTESTED, DhdLibrary
 from tactileq.rig.machines.force.hand import ForceHand
-from tactileq.rig.machines.force.wall import SLOWEST
+from tactileq.rig.machines.force.states import Cause
+from tactileq.rig.machines.force.wall import SLOW_FROM
 from tactileq.rig.shared.live.clock import sleep
 from tactileq.rig.shared.live.compiled import compiled
 from tactileq.rig.shared.live.memory import Live
@@ -221,7 +222,7 @@ def _force(rig: RigFile, force: ForceSection) -> list[Finding]:
     """The force device and its library, and what a wall on it may be."""
     stable = f"passive up to {largest_of(rig):.3g} N/mm"
     if rig.own_device is None:
-        tolerated_ms = SLOWEST * 1e3 / force.rate_hz
+        tolerated_ms = SLOW_FROM * 1e3 / force.rate_hz
         stable += f" at periods of up to {tolerated_ms:g} ms on average, above which it lets go"
     if force.damping.assumed or force.delay_ms.assumed:
         stable += ", on assumed damping or delay"
@@ -249,22 +250,26 @@ def _servo(rig: RigFile, force: ForceSection) -> Finding:
     """Which period the servo reaches; it runs for a while, without force."""
     settings = force_settings(rig, sounds=False)
     assert settings is not None
-    most_ms = SLOWEST * 1e3 / force.rate_hz
+    most_ms = SLOW_FROM * 1e3 / force.rate_hz
     try:
         with (
             Live.create() as live,
             ForceHand(live, hand_settings(rig), replace(settings, watched=False)) as hand,
         ):
             sleep(SERVO_S)
-            reached_ms = 1e3 * hand.control.longest_mean_s
+            reached_ms, status = 1e3 * hand.control.longest_mean_s, hand.status
     except InputError as error:
         return Finding("servo", str(error), "fault")
+    if status.cause:
+        unread = status.cause in (Cause.NOT_READ, Cause.NOT_A_NUMBER)
+        state: State = "fault" if unread else "note"
+        return Finding("servo", status.sentence, state)
     reached = f"a period of {reached_ms:.2f} ms on average at worst over {SERVO_S:g} s"
     if reached_ms <= most_ms:
         return Finding("servo", f"{reached}; above {most_ms:g} ms it lets go")
     return Finding(
         "servo",
-        f"expected at most {most_ms:g} ms, twice 1/force.rate_hz, got {reached}; close other "
+        f"expected at most {most_ms:g} ms, 1.5 times 1/force.rate_hz, got {reached}; close other "
         "programs, allow real-time priority, or lower force.rate_hz.",
         "note",
     )

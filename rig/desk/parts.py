@@ -20,7 +20,9 @@ from tactileq.rig.shared.live.memory import Live
 from tactileq.rig.shared.setup.rig_file import RigFile
 from tactileq.rig.shared.setup.sections import AccelerometerSection
 
-PROBE_N = 1.0  # after arming: a hand feels it, and encoders see what it moves
+# The small force after arming: a hand feels it, and encoders see what it moves. Less than the
+# second one moves too little, and a device that pushes no harder hurts nobody.
+PROBE_N, LEAST_PROBE_N = 1.0, 0.5
 SILENT_S = 0.06  # beyond three blocks: a wall is released where nothing was played for so long
 
 
@@ -153,7 +155,7 @@ def force_settings(rig: RigFile, *, sounds: bool = True, seed: int = 0) -> Force
         frozen_s=1e-3 * force.frozen_ms.value,
         release_s=1e-3 * force.release_ms.value,
         answer_s=1e-3 * force.delay_ms.value,
-        probe_n=min(PROBE_N, force.most_n.value / 2),
+        probe_n=probe_n(force.most_n.value),
         low_mm=force.low_mm,
         high_mm=force.high_mm,
         pose=Pose()
@@ -163,6 +165,11 @@ def force_settings(rig: RigFile, *, sounds: bool = True, seed: int = 0) -> Force
         simulated=rig.simulated,
         vibration=_vibration(rig, seed),
     )
+
+
+def probe_n(most_n: float) -> float:
+    """Of a device that pushes with at most so much; 0 for none."""
+    return min(PROBE_N, most_n) if most_n >= LEAST_PROBE_N else 0.0
 
 
 def _vibration(rig: RigFile, seed: int) -> Vibration | None:

@@ -66,8 +66,8 @@ def usual_wall(rig: RigFile) -> Wall:
 def largest_of(rig: RigFile, *, wall_damping_n_s_per_m: float = 0.0) -> float:
     """Stiffness (N/mm) up to which this rig's walls are passive.
 
-    A servo lets go where its periods are more than SLOWEST nominal ones on average, and has to be
-    passive up to there; a device that renders by itself has a timer.
+    A servo lets go where its periods are too long on average, and has to be passive up to there,
+    for SLOWEST nominal ones; a device that renders by itself has a timer.
 
     Raises
     ------

@@ -159,7 +159,7 @@ static inline void tq_device_limit(tq_device *d)
     l->origin_mm[2] = -50;
     for (n = 0; n < 3; n++)
         l->axes[4 * n] = 1;
-    l->probe_n = v->force_limit < 2 ? v->force_limit / 2 : 1;
+    l->probe_n = v->force_limit > 1 ? 1 : v->force_limit < 0.5f ? 0 : v->force_limit; /* as rig/desk/parts.py */
     d->least_n = v->tension_range[0] > c->rewind_n ? v->tension_range[0] : c->rewind_n;
     if (d->least_n > v->current_limit * c->n_per_a + c->rewind_n)
         d->least_n = v->current_limit * c->n_per_a + c->rewind_n;

@@ -122,10 +122,10 @@ enum {
     TQD_CAUSE_HOST = 15, /* another host, or the same one anew, said hello */
     TQD_CAUSE_STUCK = 16, /* one encoder stood still while the other one went on for 3 mm */
     TQD_CAUSE_SLACK = 17, /* a cable carried less than half of what it is to pull with for 20 ms, by the estimate from its motor */
-    TQD_CAUSE_SLOW = 18,
+    TQD_CAUSE_SLOW = 18, /* of a servo */
     TQD_CAUSE_UNANSWERED = 19, /* after ARM the tool did not give way to a small force, or moved against it */
     TQD_CAUSE_PRESSED_THROUGH = 20, /* deeper than where the wall's force is at ForceLimit, for 1 s */
-    TQD_CAUSE_FORCES_OFF = 21,
+    TQD_CAUSE_FORCES_OFF = 21, /* of a servo, as the next three */
     TQD_CAUSE_OFF_SWITCH = 22,
     TQD_CAUSE_OFF_SPEED = 23,
     TQD_CAUSE_OFF_WATCHDOG = 24,

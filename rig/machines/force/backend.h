@@ -60,6 +60,7 @@ static inline int32_t tq_counts_on(int32_t counts, uint16_t moved)
 typedef struct {
     tq_number position_mm[3]; /* of the tool, in the device's own right-handed frame */
     int failed;
+    int stale;  /* the same reading once more: the device has no newer one */
     int button; /* whether its button is down */
     int off;    /* why the device itself has switched its forces off: a cause of force.h; 0 while they are on */
 } tq_sensed;

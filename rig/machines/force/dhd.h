@@ -2,7 +2,7 @@
 
    The functions are those of the maker's library (libdhd, 3.3 or later), which the laboratory has
    installed; `tactileq.rig.machines.force.dhd` finds them at run time. Metres and newtons; -1 is a failure, while
-   DHD_TIMEGUARD (1) and DHD_MOTOR_SATURATED (2) are none.
+   DHD_TIMEGUARD (1, the last position once more) and DHD_MOTOR_SATURATED (2) are none.
 
    The device switches its forces off by itself: by its force switch, above its speed limit, where its own
    watchdog heard nothing. They stay off until they are enabled again, whatever it is told to push with, and
@@ -16,7 +16,7 @@
 #include "force.h"
 
 /* A status has 15 to 17 words, by the version of the library; of a later one there is room for more. */
-enum { TQ_DHD_STATUS = 32, TQ_DHD_RESET = 3, TQ_DHD_FORCE = 5, TQ_DHD_ERROR = 9, TQ_DHD_OFF_CAUSE = 14 };
+enum { TQ_DHD_TIMEGUARD = 1, TQ_DHD_STATUS = 32, TQ_DHD_RESET = 3, TQ_DHD_FORCE = 5, TQ_DHD_ERROR = 9, TQ_DHD_OFF_CAUSE = 14 };
 
 typedef struct {
     int (*get_position)(double *x_m, double *y_m, double *z_m, char id);
@@ -41,9 +41,9 @@ static inline void tq_dhd_read(void *device, tq_sensed *sensed)
 {
     const tq_dhd *dhd = (const tq_dhd *)device;
     double x_m = 0, y_m = 0, z_m = 0;
-    int status[TQ_DHD_STATUS] = { 0 };
-    sensed->failed = dhd->get_position(&x_m, &y_m, &z_m, (char)dhd->id) < 0
-                     || dhd->get_status(status, (char)dhd->id) < 0 || status[TQ_DHD_RESET];
+    int status[TQ_DHD_STATUS] = { 0 }, got = dhd->get_position(&x_m, &y_m, &z_m, (char)dhd->id);
+    sensed->stale = got == TQ_DHD_TIMEGUARD;
+    sensed->failed = got < 0 || dhd->get_status(status, (char)dhd->id) < 0 || status[TQ_DHD_RESET];
     sensed->off = tq_dhd_off(status);
     sensed->position_mm[0] = 1e3 * x_m;
     sensed->position_mm[1] = 1e3 * y_m;

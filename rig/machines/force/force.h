@@ -45,13 +45,15 @@ static inline int tq_force_next(int state, int event)
     return next[state][event];
 }
 
-/* The period for which walls have to be passive, in nominal ones; a running mean above it is a fault. */
+/* In nominal periods: a running mean above the first one is a fault; walls have to be passive for the second one.
+   A tool that swings is twice as fast at its best as on average (v^2), and long periods may come just then. */
+#define TQ_SLOW_FROM ((tq_number)1.5)
 #define TQ_SLOWEST 2
 /* After ARM a small force tells whether the tool gives way to it: below the wall's limits, at a frequency that
    is above what a hand does by itself and below what encoders do not resolve. docs/force-device.md#does-it-give-way */
 #define TQ_PROBE_S ((tq_number)0.4)
 #define TQ_PROBE_HZ ((tq_number)12.5)
-#define TQ_LEAST_ANSWER_MM ((tq_number)0.03)
+#define TQ_LEAST_MM_PER_N ((tq_number)0.03)
 /* A wall that is pressed deeper than where its force is at the limit, for so long, is none any more. */
 #define TQ_THROUGH_S ((tq_number)1)
 
@@ -157,7 +159,8 @@ static inline void tq_force_set_wall(tq_force *f, const tq_wall *wall)
 
 /* The running mean of the period, over as long as lets one reading of `late_s` pass, and 20 ms at least: a wall
    that is held for a period T gives up to K v^2 T^2 / 2 to a hand of speed v, which b v^2 T takes away. With
-   periods that differ it is their mean, each weighted by its own length, that may not be above 2 b / K. */
+   periods that differ it is their mean, each weighted by v^2 and its own length, that may not be above 2 b / K;
+   without v^2 it is M, with it at most 2 M - T of a tool that swings. */
 static inline void tq_force_average(tq_force *f, tq_number step_s)
 {
     const tq_number period_s = f->limits.period_s, late_s = f->limits.late_s, shortest_s = (tq_number)0.02;
@@ -167,7 +170,7 @@ static inline void tq_force_average(tq_force *f, tq_number step_s)
     if (!f->sensed) {
         f->mean_s = period_s;
     } else if (step_s > 0 && step_s <= late_s) {
-        window_s = late_s * (late_s - period_s) / period_s;
+        window_s = late_s * (late_s - period_s) / ((TQ_SLOW_FROM - 1) * period_s);
         window_s = window_s > shortest_s ? window_s : shortest_s;
         f->mean_s += step_s / (window_s + step_s) * (step_s - f->mean_s);
     }
@@ -233,7 +236,7 @@ static inline tq_number tq_force_wave(tq_number turns)
     return part < half ? size : -size;
 }
 
-/* Whether the tool moved as what has mass, damping and a soft hand does: along the force, behind it by 20 to 200
+/* Whether the tool moved as what has mass, damping and a soft hand does: along the force, behind it by 35 to 185
    degrees. One whose encoders count backwards is ahead of that by half a turn; one that stands still, or goes
    sideways, tells nothing. */
 static inline int tq_force_answered(const tq_force *f)
@@ -243,7 +246,7 @@ static inline int tq_force_answered(const tq_force *f)
     for (n = 0; n < 2; n++)
         aside += f->sine[n] * f->sine[n] + f->cosine[n] * f->cosine[n];
     gives = (tq_number)-0.34 * f->sine[2] - (tq_number)0.94 * f->cosine[2];
-    return gives >= TQ_LEAST_ANSWER_MM * f->weight && 16 * gives * gives >= along && aside <= along;
+    return gives >= TQ_LEAST_MM_PER_N * f->limits.probe_n * f->weight && 16 * gives * gives >= along && aside <= along;
 }
 
 /* The small force after ARM: fades in and out, and sums what answers it. */
@@ -292,7 +295,7 @@ static inline int tq_force_pushes_wrong(tq_force *f, const tq_sensed *sensed, tq
 {
     if (sensed->off)
         return sensed->off;
-    if (f->mean_s > TQ_SLOWEST * f->limits.period_s)
+    if (f->mean_s > TQ_SLOW_FROM * f->limits.period_s)
         return TQ_SLOW;
     if (tq_force_unanswered(f))
         return TQ_UNANSWERED;

@@ -20,7 +20,7 @@ from tactileq.rig.shared.live.memory import Live
 from tactileq.rig.shared.live.messages import Done
 
 PROBE_S = 0.45  # of the small force after arming, TQ_PROBE_S of force.h, and what follows it
-ENABLING_S = 0.01  # for a device to say that its forces are on
+ENABLING_S = 0.03  # for a device to say that its forces are on
 START_ANEW_S = 2.0  # for a process that takes the place of another one
 _LOOK_S = 0.002
 
@@ -96,9 +96,11 @@ class ForceHand(HandReader):
         InputError
             If the device has a fault still, and which.
         """
+        until_s = now_s() + START_ANEW_S
+        while self.status.state == State.RELEASING and now_s() < until_s:
+            sleep(_LOOK_S)
         if self.status.state == State.FAULT:
             self._control.ask(Ask.CLEAR)
-        until_s = now_s() + START_ANEW_S
         while self._begins and now_s() < until_s:
             sleep(_LOOK_S)
         if self.status.state == State.IDLE:

@@ -16,7 +16,7 @@
 
 #define TQ_LOST_S 0.5      /* a device that has failed for so long is opened again */
 #define TQ_READING_S 0.001 /* between two readings in shared memory */
-#define TQ_ENABLING_S 0.003 /* after which a device that was enabled has to say that its forces are on */
+#define TQ_ENABLING 8 /* ticks until a device that was enabled has to say that its forces are on */
 
 /* What the host asks of the servo. */
 enum { TQ_ASK_NOTHING, TQ_ASK_ARM, TQ_ASK_SHOW, TQ_ASK_HIDE, TQ_ASK_CLEAR, TQ_ASK_STOP };
@@ -38,8 +38,8 @@ struct tq_servo {
     tq_backend backend;
     tq_live *live;
     uint64_t asked, blocks; /* what was asked last, and how much had been played */
-    double shown_s, played_s, read_s, reported_s, failing_s, enabled_s;
-    int button, stopping;
+    double shown_s, played_s, read_s, reported_s, failing_s;
+    int button, stopping, enabling;
 };
 typedef struct tq_servo tq_servo;
 
@@ -58,7 +58,7 @@ static inline void tq_servo_start(tq_servo *s, tq_live *live, tq_backend backend
     s->settings = *settings, s->live = live, s->backend = backend;
     s->asked = tq_word(live, TQ_WORD_ASKED); /* what was asked of an earlier servo is over */
     s->blocks = tq_blocks_written(live);
-    s->read_s = s->enabled_s = -1;
+    s->read_s = -1;
     tq_put_figure(live, TQ_WORD_PERIOD, 0);
     tq_put_word(live, TQ_WORD_STATE, (s->asked << 16) | TQ_BOOT);
 }
@@ -86,7 +86,7 @@ static inline void tq_servo_obey(tq_servo *s, double now_s)
     switch (asked & 255) {
     case TQ_ASK_ARM:
         if (s->force.state == TQ_IDLE)
-            s->backend.enable(s->backend.device), s->enabled_s = now_s;
+            s->backend.enable(s->backend.device), s->enabling = TQ_ENABLING;
         tq_force_event(&s->force, TQ_ARM, 0);
         break;
     case TQ_ASK_SHOW:
@@ -169,11 +169,18 @@ static inline int tq_servo_tick(tq_servo *s)
     s->backend.read(s->backend.device, &sensed);
     now_s = tq_now(); /* after it: a reading that stalls is late */
     step_s = s->read_s < 0 ? 0 : now_s - s->read_s;
+    if (sensed.stale && !sensed.failed && !sensed.off && step_s <= s->force.limits.late_s) {
+        s->backend.push(s->backend.device, s->force.command_n); /* its own watchdog is to hear of one */
+        tq_put_figure(s->live, TQ_WORD_TICK, now_s);
+        return 1;
+    }
     s->read_s = now_s;
     tq_servo_obey(s, now_s);
     tq_servo_mind(s, now_s);
-    if (now_s - s->enabled_s < TQ_ENABLING_S)
-        sensed.off = TQ_NO_CAUSE;
+    if (!sensed.off)
+        s->enabling = 0;
+    else if (s->enabling)
+        s->enabling--, sensed.off = TQ_NO_CAUSE;
     tq_force_tick(&s->force, &sensed, step_s);
     if (s->backend.push(s->backend.device, s->force.command_n)
         && (s->force.state == TQ_ARMED || s->force.state == TQ_RUNNING))

@@ -31,8 +31,9 @@ typedef struct {
     int fail_reads, nan_reads, jump_reads, fail_pushes, freezes, button, flipped;
     int switched_off;    /* its force switch */
     double stall_s, jump, most_m_s; /* its speed limit; 0: none */
+    double guard_s;                 /* sooner than so long after a position there is no new one */
     /* What happens. */
-    double time_s, began_s, pushed_s;
+    double time_s, began_s, pushed_s, told_s;
     double position[3], velocity[3], force[3], shown[3];
     double most_n; /* largest force that it was given */
     uint64_t reads, pushes, seed;
@@ -254,7 +255,7 @@ int dhdGetPosition(double *x, double *y, double *z, char id)
 {
     tq_standin *d = tq_the_device;
     double *out[3];
-    int n;
+    int n, guarded;
     (void)id;
     out[0] = x, out[1] = y, out[2] = z;
     if (d->stall_s > 0) {
@@ -270,8 +271,10 @@ int dhdGetPosition(double *x, double *y, double *z, char id)
         tq_the_error = "communication failed";
         return -1;
     }
+    if (!(guarded = d->guard_s > 0 && tq_now() - d->told_s < d->guard_s))
+        d->told_s = tq_now();
     for (n = 0; n < 3; n++) {
-        if (!d->freezes)
+        if (!d->freezes && !guarded)
             d->shown[n] = d->resolution * floor(d->position[n] / d->resolution + 0.5);
         *out[n] = d->nan_reads ? NAN : n == 2 && d->flipped ? -d->shown[n] : d->shown[n];
     }
@@ -279,7 +282,7 @@ int dhdGetPosition(double *x, double *y, double *z, char id)
         *x += d->jump, d->jump_reads--;
     if (d->nan_reads)
         d->nan_reads--;
-    return 0;
+    return guarded; /* DHD_TIMEGUARD */
 }
 
 int dhdSetForce(double x, double y, double z, char id)

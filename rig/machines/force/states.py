@@ -101,16 +101,16 @@ SENTENCES = {
     Cause.SLACK: "expected both cables of the device to pull, got one that is slack; lift the tool "
     "more slowly, or check its cables.",
     Cause.SLOW: "expected the servo of the force device to tick every 1/force.rate_hz, got more "
-    "than twice that on average; close other programs, allow real-time priority, or lower "
+    "than 1.5 times that on average; close other programs, allow real-time priority, or lower "
     "force.rate_hz.",
     Cause.UNANSWERED: "expected the tool to give way to a small force, got one that stood still or "
     "moved against it; hold it loosely in the air, and if that does not help, check that its "
-    "encoders count the right way.",
+    "encoders count the right way, and force.delay_ms.",
     Cause.PRESSED_THROUGH: "expected a hand that presses no harder than force.most_n, got a tool "
     "that went through the wall for a second; press less hard, and if nobody did, check that "
     "the device's encoders count the right way.",
-    Cause.FORCES_OFF: "expected the force device to have its forces on, got them off; see what its "
-    "own display says, and its power.",
+    Cause.FORCES_OFF: "expected the force device to have its forces on, got them off; check its "
+    "power and cable, its deadman switch, and what its own display says.",
     Cause.OFF_SWITCH: "expected the force device to have its forces on, got them off by its force "
     "switch; switch them on there.",
     Cause.OFF_SPEED: "expected a tool slower than the force device's own limit, got a faster "

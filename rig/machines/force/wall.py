@@ -9,7 +9,9 @@ from tactileq.modeling.checks import check_number
 
 STIFFEST_N_PER_MM = 20.0
 LARGEST_MM = 1000.0
-SLOWEST = 2  # nominal periods on average, above which a servo lets go: TQ_SLOWEST of force.h
+# In nominal periods, as in force.h: above the first one on average a servo lets go; walls are to be
+# passive for the second one, since long periods may come when the tool is fastest.
+SLOW_FROM, SLOWEST = 1.5, 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,8 +58,7 @@ def largest_stiffness_n_per_mm(
     Parameters
     ----------
     rate_hz : float
-        Ticks in a second, above 0; of periods that differ, one over their mean, each weighted by
-        its own length.
+        Ticks in a second, above 0.
     damping_n_s_per_m : float
         Of the device itself (viscous), ≥ 0; what the hand adds is not counted.
     delay_s : float

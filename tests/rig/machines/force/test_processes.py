@@ -226,6 +226,18 @@ def test_a_hiccup_that_trips_the_devices_own_watchdog_is_a_fault_and_no_wall_wit
         assert hand.status.cause == Cause.OFF_WATCHDOG
 
 
+def test_a_device_that_says_nothing_new_is_as_late_as_its_readings(device: StandIn) -> None:
+    """Sooner than its time guard it gives the last position once more, and says so."""
+    settings = ForceSettings(**{**vars(SETTINGS), "late_s": 0.006})
+    for guard_s, cause in ((0.0009, Cause.NONE), (0.002, Cause.SLOW), (0.008, Cause.LATE)):
+        with opened(settings) as (live, hand):
+            device.fields.guard_s = 0.0
+            pressed(device, live, hand)
+            device.fields.guard_s = guard_s - 0.0002
+            follow(0.2, live.heartbeat)
+            assert hand.status.cause == cause
+
+
 def test_a_tool_that_answers_the_wrong_way_or_not_at_all_is_not_armed(device: StandIn) -> None:
     with opened(ForceSettings(**{**vars(SETTINGS), "probe_n": 1.0})) as (live, hand):
         device.fields.flipped = 1

@@ -217,15 +217,15 @@ static int mass(double factor, int delay)
 
 /* A weight on a wall whose servo ticks at periods that differ: how far it swings in the end, and whether the servo
    let go before it swung by 0.1 mm. */
-static int late(double factor, double least_ms, double most_ms, double late_ms, unsigned long long seed)
+static int late(double factor, double least_ms, double most_ms, double late_ms, double kg)
 {
-    const double T = 0.001, b = 0.0005, m = 0.0002, weight = 1, h = 5e-5;
+    const double T = 0.001, b = 0.0005, m = kg / 1000, weight = 1, h = 5e-5;
     tq_force_limits l = usual();
     tq_force f;
     tq_wall wall = { 0, factor * tq_largest_stiffness(b, 0, TQ_SLOWEST * T, 0), 0, 100, 100 };
     tq_sensed s;
     double z, v = 1, t = 0, worst = 0, last = 0, fell_s = -1, step_s = T, fastest = 0, rest, mean = 0;
-    state_of_chance = seed, rest = z = -weight / wall.stiffness_n_per_mm;
+    state_of_chance = 1, rest = z = -weight / wall.stiffness_n_per_mm;
     l.late_s = late_ms * 1e-3, l.frozen_s = 1e9, l.show_s = 1e-9;
     memset(&s, 0, sizeof s);
     tq_force_start(&f, &l);
@@ -243,12 +243,12 @@ static int late(double factor, double least_ms, double most_ms, double late_ms, 
         force = f.normal_n;
         step_s = 1e-3 * (least_ms + (most_ms - least_ms) * chance());
         if (most_ms < 0) {
-            double window_s = l.late_s * (l.late_s - T) / T;
+            double gap_s = -most_ms / 1000, window_s = l.late_s * (l.late_s - T) / ((TQ_SLOW_FROM - 1) * T);
             window_s = window_s > 0.02 ? window_s : 0.02;
             fastest = fabs(v) > fastest ? fabs(v) : fastest * 0.999;
             step_s = fabs(v) > 0.95 * fastest
-                     && f.mean_s + l.late_s / (window_s + l.late_s) * (l.late_s - f.mean_s) < TQ_SLOWEST * T
-                         ? l.late_s : T;
+                     && f.mean_s + gap_s / (window_s + gap_s) * (gap_s - f.mean_s) < TQ_SLOW_FROM * T
+                         ? gap_s : T;
         }
         for (until_s = t + step_s; t < until_s - h / 2; t += h) {
             v += (force - weight - b * v) / m * h;
@@ -313,7 +313,7 @@ int main(int count, char **words)
         return strokes(strtoull(words[2], NULL, 10), atoi(words[3]), atof(words[4]), atoi(words[5]),
                        atof(words[6]));
     if (count > 6 && !strcmp(words[1], "late"))
-        return late(atof(words[2]), atof(words[3]), atof(words[4]), atof(words[5]), strtoull(words[6], NULL, 10));
+        return late(atof(words[2]), atof(words[3]), atof(words[4]), atof(words[5]), atof(words[6]));
     if (count > 4 && !strcmp(words[1], "probe"))
         return probe(strtoull(words[2], NULL, 10), atoi(words[3]), atof(words[4]));
     return mass(atof(words[2]), atoi(words[3]));
