@@ -196,6 +196,7 @@ RIG = Kind(
                 "median_ms": figure(12, "ms"),
                 "p95_ms": figure(15, "ms"),
                 "measured_on": DAY,
+                "rests_on": ["sound.block = 128"],
             },
             "calibration": {
                 "date": DAY,
