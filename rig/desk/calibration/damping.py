@@ -19,7 +19,7 @@ from tactileq.rig.desk.calibration.stiffness import NO_WALL
 from tactileq.rig.machines.force.hand import ForceHand
 from tactileq.rig.machines.force.states import State
 from tactileq.rig.machines.force.wall import Wall
-from tactileq.rig.shared.live.clock import now_s, sleep
+from tactileq.rig.shared.live.clock import now_s, sleep, taking_part
 from tactileq.rig.shared.live.memory import Live
 
 SOFT_N_PER_MM, LEAST_N_PER_MM = 0.1, 0.02
@@ -33,7 +33,7 @@ _DEPTH_MM = 5.0  # into the wall by a constant force, about which the tool swing
 _SWING_MM = 2.0
 _PEAK_N = (0.1, 0.4)  # of the sines: first, and at most
 _RAMP_S = 1.0
-_EVERY_S = 0.002
+_EVERY_S = 0.001723  # hardly ever whole ticks: which of two things came first is then known
 _STILL_HZ = (50.0, 64.0)  # where no sine is, nor much of the motion that ends leave
 _SMOOTHED_S = 0.02  # a speed is measured over this time, as steps of the encoder are large
 _RELATIVE = 0.02  # of what is never exact: steps of the force, a wall's edge
@@ -201,15 +201,16 @@ class _Shaker:
     def push(self, force_n: Callable[[float], float], *, seconds: float) -> tuple[Floats, Floats]:
         """Push for so long; when which force was asked for."""
         times, forces = [], []
-        begin_s = now_s()
-        while (since_s := now_s() - begin_s) < seconds:
-            self._live.heartbeat()
-            times.append(begin_s + since_s)
-            forces.append(float(force_n(since_s)))
-            self._hand.control.press(forces[-1])
-            sleep(_EVERY_S)
-            if (status := self._hand.status).state != State.RUNNING:
-                raise InputError(status.sentence)
+        with taking_part():  # or a force would come later than its time on a clock that tests give
+            begin_s = now_s()
+            while (since_s := now_s() - begin_s) < seconds:
+                self._live.heartbeat()
+                times.append(begin_s + since_s)
+                forces.append(float(force_n(since_s)))
+                self._hand.control.press(forces[-1])
+                sleep(_EVERY_S)
+                if (status := self._hand.status).state != State.RUNNING:
+                    raise InputError(status.sentence)
         return np.array(times), np.array(forces)
 
     def run(self, rest_n: float, sines_n: Callable[[float], float], *, peak_n: float) -> Run:

@@ -122,7 +122,7 @@ def test_one_that_waits_sleeps(device: Emulator) -> None:
 
 @pytest.mark.parametrize("device", ["stm32"], indirect=True)
 def test_instructions_are_those_of_the_page(device: Emulator) -> None:
-    """Counted by QEMU, one nanosecond each; at most 1500 a tick with four layers."""
+    """Counted by QEMU, one nanosecond each; at most 1600 a tick with four layers."""
     page = (DOCS / "device.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (.+?) \| (\d+) \|$", page, flags=re.MULTILINE)
     stated = {name: int(count) for name, count in rows}
@@ -132,7 +132,7 @@ def test_instructions_are_those_of_the_page(device: Emulator) -> None:
         print("\ninstructions per tick:", {name: round(each) for name, each in counted.items()})
         for name, count in counted.items():
             assert count == pytest.approx(stated[name], rel=BAND)
-        assert counted["4 layers"] <= 1500
+        assert counted["4 layers"] <= 1600
 
     with counting_board(device.firmware) as transport:
         in_time(lambda: check(transport), lambda: nullcontext(transport))
@@ -144,6 +144,7 @@ def counted_with(talk: Conversation) -> dict[str, float]:
     until_idle(talk)
     for command in (DeviceCommand.HOME, DeviceCommand.ARM, DeviceCommand.SHOW):
         talk.write("Command", command)
+    per_tick(talk), per_tick(talk)  # the small force after ARM has ended
     counted = {"force alone": per_tick(talk)}
     for layers in (1, 4, 8):
         upload = device_model(layered_texture(layers), hello)
