@@ -63,10 +63,9 @@ def check_rig(
     ------
     InputError
         For a p95 of the latency above 40 ms, or one of another card, block or hand, without an
-        override; for no calibration, one that does
-        not fit this rig, or an older one than allowed; for an assumed force where it must be
-        measured; for a window's pointer as the hand in a study; for limits that the card cannot
-        play; for a wall that the device cannot render.
+        override; for no calibration, one that does not fit this rig, or an older one than allowed;
+        for an assumed force where it must be measured; for a window's pointer as the hand in a
+        study; for limits that the card cannot play; for a wall that the device cannot render.
     """
     for check in _checks(rig, requirements, today=today, override=override, walls=walls).values():
         check()

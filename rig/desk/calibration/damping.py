@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import InputError
-from tactileq.rig.desk.calibration.stiffness import NO_WALL
+from tactileq.rig.desk.calibration.stiffness import armed_at, is_commanded
 from tactileq.rig.machines.force.hand import ForceHand
 from tactileq.rig.machines.force.states import State
 from tactileq.rig.machines.force.wall import Wall
@@ -28,7 +28,6 @@ RUNS = 12  # half of them with half the force
 TONES_HZ = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.5, 9.0, 11.0, 14.0, 17.0, 21.0, 26.0, 32.0)
 LEAST_COHERENCE = 0.9
 WIDEST = 0.5  # half of a 95 % interval, of its value
-TOLERANCE = 0.1  # of the wall's stiffness, and of damping between the two forces
 _DEPTH_MM = 5.0  # into the wall by a constant force, about which the tool swings
 _SWING_MM = 2.0
 _PEAK_N = (0.1, 0.4)  # of the sines: first, and at most
@@ -164,10 +163,7 @@ def shaken(
     InputError
         If the device lets go, or the tool leaves the wall.
     """
-    hand.arm()
-    live.heartbeat()
-    hand.show(NO_WALL)
-    height_mm = NO_WALL.height_mm - hand.control.depth_mm
+    height_mm = armed_at(live, hand)
     hand.hide()
     hand.show(Wall(height_mm=height_mm, stiffness_n_per_mm=stiffness_n_per_mm))
     rest_n, rng = stiffness_n_per_mm * _DEPTH_MM, np.random.default_rng(0)
@@ -280,7 +276,7 @@ def damping_of(runs: Sequence[Run], *, stiffness_n_per_mm: float, period_s: floa
         )
     found, mass, delay, stiffness = np.array([fit.values for fit in fits]).T
     wall, rendered = 1e3 * stiffness_n_per_mm, _mean(stiffness)
-    if abs(rendered.value - wall) > TOLERANCE * wall + rendered.half:
+    if not is_commanded(rendered.value, wall, within=rendered.half):
         raise InputError(
             f"expected about {wall / 1e3:.3g} N/mm of the soft wall, as commanded, got "
             f"{rendered.value / 1e3:.3g} N/mm; let go of the tool, see that it touches nothing "

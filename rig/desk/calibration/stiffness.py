@@ -50,6 +50,20 @@ class Pressed:
     simulated: bool
 
 
+def armed_at(live: Live, hand: ForceHand) -> float:
+    """Arm, and show a wall that nobody feels; the tool's height (mm), along the frame's z.
+
+    Raises
+    ------
+    InputError
+        If the device has a fault, and which.
+    """
+    hand.arm()
+    live.heartbeat()
+    hand.show(NO_WALL)
+    return NO_WALL.height_mm - hand.control.depth_mm
+
+
 def press_on(
     live: Live,
     hand: ForceHand,
@@ -75,10 +89,7 @@ def press_on(
     InputError
         If the device lets go, or the surface does not give way like a spring.
     """
-    hand.arm()
-    live.heartbeat()
-    hand.show(NO_WALL)
-    wall, start_mm = NO_WALL, NO_WALL.height_mm - hand.control.depth_mm
+    wall, start_mm = NO_WALL, armed_at(live, hand)
     if wall_n_per_mm is not None:
         hand.hide()
         wall = Wall(height_mm=start_mm, stiffness_n_per_mm=wall_n_per_mm)
@@ -139,6 +150,11 @@ def pressed(force_n: Floats, depth_mm: Floats, *, simulated: bool) -> Pressed:
     )
 
 
+def is_commanded(found: float, commanded: float, *, within: float) -> bool:
+    """Whether a stiffness is the one that was commanded, but for TOLERANCE and its uncertainty."""
+    return abs(found - commanded) <= TOLERANCE * commanded + within
+
+
 def check_virtual(virtual: Pressed, *, commanded_n_per_mm: float) -> None:
     """Refuse a virtual wall that is not as stiff as was commanded: something else bears the tool.
 
@@ -147,7 +163,7 @@ def check_virtual(virtual: Pressed, *, commanded_n_per_mm: float) -> None:
     InputError
     """
     found, likely = virtual.stiffness_n_per_mm, virtual.uncertainty_n_per_mm
-    if abs(found - commanded_n_per_mm) <= TOLERANCE * commanded_n_per_mm + likely:
+    if is_commanded(found, commanded_n_per_mm, within=likely):
         return
     raise InputError(
         f"expected about {commanded_n_per_mm:.3g} N/mm of the virtual wall, as commanded, got "

@@ -178,6 +178,18 @@ static int strokes(unsigned long long seed, int count, double factor, int delay,
     return 0;
 }
 
+/* A wall that is shown, with the tool 1 mm above it. */
+static void show_from_above(tq_force *f, tq_sensed *s, const tq_force_limits *l, const tq_wall *wall)
+{
+    memset(s, 0, sizeof *s);
+    tq_force_start(f, l);
+    tq_force_set_wall(f, wall);
+    s->position_mm[2] = 1;
+    tq_force_tick(f, s, 0.001);
+    tq_force_event(f, TQ_ARM, 0);
+    tq_force_event(f, TQ_SHOW, 0);
+}
+
 static int mass(double factor, int delay)
 {
     const double T = 0.001, b = 0.0005, m = 0.0001, weight = 1; /* N s/mm, N s2/mm, N */
@@ -190,13 +202,7 @@ static int mass(double factor, int delay)
     z = -weight / wall.stiffness_n_per_mm;
     l.most_n = 1e6, l.most_n_per_s = 1e12, l.most_w = 1e12, l.most_mm_s = 1e9, l.frozen_s = 1e9;
     l.show_s = 1e-9, l.low_mm[2] = -1e6, l.high_mm[2] = 1e6;
-    memset(&s, 0, sizeof s);
-    tq_force_start(&f, &l);
-    tq_force_set_wall(&f, &wall);
-    s.position_mm[2] = 1;
-    tq_force_tick(&f, &s, T);
-    tq_force_event(&f, TQ_ARM, 0);
-    tq_force_event(&f, TQ_SHOW, 0);
+    show_from_above(&f, &s, &l, &wall);
     for (k = 0; k < 20000; k++) {
         double force;
         s.position_mm[2] = z;
@@ -227,13 +233,7 @@ static int late(double factor, double least_ms, double most_ms, double late_ms, 
     double z, v = 1, t = 0, worst = 0, last = 0, fell_s = -1, step_s = T, fastest = 0, rest, mean = 0;
     state_of_chance = 1, rest = z = -weight / wall.stiffness_n_per_mm;
     l.late_s = late_ms * 1e-3, l.frozen_s = 1e9, l.show_s = 1e-9;
-    memset(&s, 0, sizeof s);
-    tq_force_start(&f, &l);
-    tq_force_set_wall(&f, &wall);
-    s.position_mm[2] = 1;
-    tq_force_tick(&f, &s, T);
-    tq_force_event(&f, TQ_ARM, 0);
-    tq_force_event(&f, TQ_SHOW, 0);
+    show_from_above(&f, &s, &l, &wall);
     f.sensed = 0; /* the mass is put onto the wall */
     while (t < 20 && f.cause == TQ_NO_CAUSE) {
         double force, until_s;

@@ -22,6 +22,7 @@ from tactileq.rig.desk import inventory
 from tactileq.rig.desk.checks import Requirements, check_rig
 from tactileq.rig.desk.desk_rig import DeskRig
 from tactileq.rig.devices.sound.devices import SoundDevice
+from tactileq.rig.machines.force.standin import PLACE
 from tactileq.rig.shared.setup.rig_file import RigFile
 from tactileq.stimuli.planted.vibrators import planted_vibrator
 from tests.rig.desk.rig_files import calibrated, rig_file
@@ -36,7 +37,7 @@ STEPS = 'counts_per_mm = { value = 4.0, unit = "counts/mm", assumed = true, sour
 
 
 @pytest.fixture(autouse=True)
-def machine(monkeypatch: pytest.MonkeyPatch) -> None:
+def machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Everything is connected and installed, so what is left is what the files say."""
 
     class Library:
@@ -48,6 +49,7 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> None:
         def find(self, serial: int | None) -> None: ...
 
     monkeypatch.setattr(inventory, "DhdLibrary", Library)
+    monkeypatch.setenv(PLACE, str(tmp_path / "device"))  # no other test opens it meanwhile
     monkeypatch.setattr(inventory, "versions", list)
     monkeypatch.setattr(inventory, "sound_devices", lambda: [CARD])
     monkeypatch.setattr(inventory, "find_device", lambda *_, **of: CARD)
