@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from tactileq.modeling.files.claims import FEW, PlanSection
+from tactileq.modeling.files.claims import PlanSection
 from tactileq.modeling.files.described import naming
 
 EQUIVALENCE, DIFFERENCE = "equivalence", "difference"
-MODEL_RULE, TESTS_RULE = "model", "tests"
+MODEL_RULE, TESTS_RULE = "hierarchical", "tests"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,12 +52,10 @@ class AnalysisPlan:
         Share of ratings at either end of a scale (0 … 1) above which no equality is concluded.
     sha256 : tuple of str
         Of the pages to preregister that sessions ran under; several where the study was changed.
-    rule : {"tests", "model"}
-        What decides the verdicts: paired t-test and TOST, as in studies that name no rule, or the
-        hierarchical model of the participants.
-    few : float
-        Share of people outside the bounds (0 … 0.5) below which the model calls two sets of models
-        equivalent.
+    rule : {"tests", "hierarchical", "model"}
+        What decides the verdicts: paired t-test and TOST, as in studies that name no rule; of
+        ratings the hierarchical model of the participants; or tests, in studies that registered a
+        model which was withdrawn (`modeling.files.claims.WITHDRAWN`).
     """
 
     claims: tuple[Claim, ...]
@@ -65,7 +63,6 @@ class AnalysisPlan:
     highest_share_at_ends: float = 0.2
     sha256: tuple[str, ...] = ()
     rule: str = TESTS_RULE
-    few: float = FEW
 
 
 def plan_from(values: object, *, path: Path, sha256: tuple[str, ...] = ()) -> AnalysisPlan:
@@ -83,9 +80,10 @@ def plan_from(values: object, *, path: Path, sha256: tuple[str, ...] = ()) -> An
     Raises
     ------
     InputError
-        For claims, a rule or a share that are not such as a study file can state.
+        For claims or a rule that are not such as a study file can state.
     """
     with naming(path):
         stated = PlanSection.read(values)
     claims = tuple(Claim(**vars(claim)) for claim in stated.claims)
-    return AnalysisPlan(**{**vars(stated), "claims": claims, "sha256": sha256})
+    said = {name: value for name, value in vars(stated).items() if name != "few"}
+    return AnalysisPlan(**{**said, "claims": claims, "sha256": sha256})

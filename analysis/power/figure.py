@@ -25,14 +25,11 @@ from tactileq.analysis.page.drawing import (
     finish_axes,
     stamp_if_simulated,
 )
-from tactileq.analysis.power.power import EVERY_TEXTURE, MEAN_ALONE, NO_VERDICT, TARGET
+from tactileq.analysis.power.power import EVERY_TEXTURE, NO_VERDICT, TARGET
 from tactileq.analysis.statistics.caveats import BOUNDS_WITHHELD, WITHHELD
 from tactileq.analysis.statistics.equivalence import (
-    ALL_BUT,
-    AVERAGE_FELT,
     DIFFERENT,
     EQUIVALENT,
-    FELT,
     INCONCLUSIVE,
     WITHIN_BOUNDS,
 )
@@ -40,10 +37,6 @@ from tactileq.analysis.statistics.equivalence import (
 # Distinguished by colour, marker and line style.
 STYLES = {
     EQUIVALENT: (BLUE, "o", "-"),
-    MEAN_ALONE: (BLACK, "d", "--"),
-    AVERAGE_FELT: (GREEN, "<", "-"),
-    ALL_BUT: (SKY_BLUE, "*", "--"),
-    FELT: (PURPLE, "p", "-"),
     WITHIN_BOUNDS: (GREEN, "^", "-."),
     DIFFERENT: (VERMILLION, "s", "-"),
     INCONCLUSIVE: (ORANGE, "D", "--"),
@@ -55,7 +48,6 @@ STYLES = {
 # What has a line of its own beside the verdicts over all textures.
 LABELS = {
     EVERY_TEXTURE: "every single texture equivalent",
-    MEAN_ALONE: "mean inside the bounds, whatever the people",
 }
 PANELS_IN_A_ROW = 3
 LETTERS_IN_A_LINE = 48  # of a panel's title

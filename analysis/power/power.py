@@ -17,16 +17,18 @@ from tactileq.analysis.answers.responses import Responses
 from tactileq.analysis.columns import TEXTURE
 from tactileq.analysis.labels import ALL_TEXTURES
 from tactileq.analysis.statistics.caveats import BOUNDS_WITHHELD, WITHHELD, Caveats
-from tactileq.analysis.statistics.claims import Values, every_equivalent, words_of_people
+from tactileq.analysis.statistics.claims import (
+    Values,
+    differences_of,
+    every_equivalent,
+    words_of_people,
+)
 from tactileq.analysis.statistics.compared_answers import claim_shares, claim_values
+from tactileq.analysis.statistics.crossover import CONFOUNDED, mean_differences
 from tactileq.analysis.statistics.draws import generators
 from tactileq.analysis.statistics.equivalence import (
-    ALL_BUT,
-    AVERAGE_FELT,
     DIFFERENT,
-    EQUAL_ON_AVERAGE,
     EQUIVALENT,
-    FELT,
     INCONCLUSIVE,
     WITHIN_BOUNDS,
     Bounds,
@@ -35,7 +37,7 @@ from tactileq.analysis.statistics.equivalence import (
 from tactileq.analysis.statistics.paired import (
     holm,
     sign_flips_p,
-    t_test,
+    t_tests,
     why_undefined,
     without_rounding_noise,
 )
@@ -44,16 +46,13 @@ from tactileq.analysis.statistics.participants.posterior import Effort
 from tactileq.analysis.statistics.participants.verdict import PeopleJudged, judged_by_size
 from tactileq.analysis.statistics.rates import clopper_pearson
 from tactileq.analysis.statistics.verdicts import claim_caveats, people_data
-from tactileq.modeling.arrays import Floats
 from tactileq.modeling.files.columns import Column, names
 
 TARGET = 0.8  # usual power to plan for
 EVERY_TEXTURE = "every texture"
-MEAN_ALONE = "mean alone"
 NO_VERDICT = "no verdict"
-FELT_WORDS = (AVERAGE_FELT, ALL_BUT, FELT)
 VERDICTS = (
-    *(EQUIVALENT, EQUAL_ON_AVERAGE, *FELT_WORDS, WITHIN_BOUNDS, DIFFERENT, INCONCLUSIVE),
+    *(EQUIVALENT, WITHIN_BOUNDS, DIFFERENT, INCONCLUSIVE),
     *(WITHHELD, BOUNDS_WITHHELD, NO_VERDICT),
 )
 
@@ -103,10 +102,8 @@ def verdicts_by_size(
         for claim in responses.plan.claims:
             caveats, key = claim_caveats(responses, claim, rng=rng), (claim.name, n)
             if key in judged:
-                shares, few = claim_shares(responses, claim), responses.plan.few
-                found += people_verdicts(
-                    claim, judged[key], n=n, shares=shares, caveats=caveats, few=few
-                )
+                shares = claim_shares(responses, claim)
+                found += people_verdicts(claim, judged[key], n=n, shares=shares, caveats=caveats)
             else:
                 values = claim_values(responses, claim)
                 found += verdicts(claim, values, n=n, caveats=caveats, rng=rng)
@@ -147,13 +144,13 @@ def judged_claims(
 
 
 def _sampled_together(responses: Responses) -> list[list[tuple[Claim, PeopleData]]]:
-    """Claims that the model of the participants decides, those alike in one list."""
+    """Claims about ratings that the model of the participants decides, those alike in one list."""
     alike: dict[tuple[object, ...], list[tuple[Claim, PeopleData]]] = {}
     for claim in responses.plan.claims:
         data = people_data(responses, claim)
-        if data is not None:
+        if data is not None and data.decides:
             shapes = (one.shape for one in vars(data.studies).values())
-            key = (claim.task, claim.bounds, data.model, *shapes)
+            key = (claim.task, claim.bounds, *shapes)
             alike.setdefault(key, []).append((claim, data))
     return list(alike.values())
 
@@ -165,7 +162,6 @@ def people_verdicts(
     n: int,
     shares: Mapping[str, float],
     caveats: Caveats,
-    few: float,
 ) -> list[Verdict]:
     """The verdicts of the model of the participants, as `claims.with_people` states them.
 
@@ -181,27 +177,21 @@ def people_verdicts(
         As `Values.share_at_ends`.
     caveats : Caveats
         Of a finished study.
-    few : float
-        Of the plan.
 
     Returns
     -------
     list of Verdict
-        Over all textures, of each, whether every single mean lies inside the bounds (as
-        `claims.all_equivalent`), and whether that over all does.
+        Over all textures, of each, and whether every single mean lies inside the bounds (as
+        `claims.all_equivalent`).
     """
     assert claim.bounds is not None
     textures = list(judged.textures["texture"])
-    words = words_of_people(
-        judged, claim.bounds, textures=textures, shares=shares, caveats=caveats, few=few
-    )
+    words = words_of_people(judged, claim.bounds, textures=textures, shares=shares, caveats=caveats)
     doubts = [caveats.doubt(shares.get(texture, np.nan)) for texture in textures]
     every = every_equivalent(judged.textures["p_equivalence"].to_numpy(float), doubts=doubts)
-    mean = EQUAL_ON_AVERAGE if judged.summary.inside(claim.bounds) else INCONCLUSIVE
     rows = {
         **{texture: word or NO_VERDICT for texture, word in words.items()},
         EVERY_TEXTURE: EQUIVALENT if every else INCONCLUSIVE,
-        MEAN_ALONE: caveats.allowed(mean, share_at_ends=shares.get(ALL_TEXTURES, np.nan)),
     }
     return [Verdict(claim.name, texture, n, word) for texture, word in rows.items()]
 
@@ -232,13 +222,10 @@ def verdicts(
     compared = values.table[~values.table["texture"].isin(list(caveats.identical))]
     if compared.empty or claim.bounds is None:
         return []
-    wide = compared.assign(difference=compared["other"] - compared["reference"]).pivot(
-        index="participant_id", columns="texture", values="difference"
-    )
-    complete = wide.dropna().mean(axis=1).to_numpy(dtype=float)
-    overall = _p_values(complete, claim.bounds, rng=rng)
-    own = (wide[texture].dropna().to_numpy(float) for texture in wide)
-    each = np.array([_p_values(differences, claim.bounds, rng=rng) for differences in own])
+    wide = differences_of(compared)
+    overall = _p_values(wide.dropna().mean(axis=1), values, claim.bounds, rng=rng)
+    own = (wide[texture].dropna() for texture in wide)
+    each = np.array([_p_values(differences, values, claim.bounds, rng=rng) for differences in own])
     adjusted = np.column_stack([holm(each[:, 0]), holm(each[:, 1])])
     rows = {ALL_TEXTURES: overall, **dict(zip(map(str, wide), adjusted, strict=True))}
     shares = {texture: values.share_at_ends.get(texture, np.nan) for texture in rows}
@@ -257,13 +244,17 @@ def verdicts(
 
 
 def _p_values(
-    differences: Floats, bounds: Bounds, *, rng: np.random.Generator
+    differences: pd.Series, values: Values, bounds: Bounds, *, rng: np.random.Generator
 ) -> tuple[float, float]:
     """p of a difference and of equivalence, over participants."""
-    differences = without_rounding_noise(differences)
-    undefined = why_undefined(differences)
-    p = sign_flips_p(differences, rng=rng) if undefined else t_test(differences)[1]
-    return p, equivalence_test(differences, bounds, rng=rng).p
+    contrasts = values.contrasts_of(differences.index)
+    own = without_rounding_noise(differences.to_numpy(dtype=float))
+    found = mean_differences(own[None, :], contrasts)
+    if why := why_undefined(found):
+        p = np.nan if why == CONFOUNDED else sign_flips_p(found.adjusted[0], rng=rng)
+    else:
+        p = float(t_tests(found)[1][0])
+    return p, equivalence_test(own, bounds, rng=rng, contrasts=contrasts).p
 
 
 def power_table(found: Iterable[Verdict], *, simulations: int) -> pd.DataFrame:
@@ -278,8 +269,7 @@ def power_table(found: Iterable[Verdict], *, simulations: int) -> pd.DataFrame:
     -------
     DataFrame
         `POWER_COLUMNS`: claims and textures as they first came, then by n; all verdicts that came
-        at any n, in the order of `VERDICTS`; of `EVERY_TEXTURE` only how often all were equivalent,
-        of `MEAN_ALONE`, where the model of the participants decides, how often it lay inside.
+        at any n, in the order of `VERDICTS`; of `EVERY_TEXTURE` only how often all were equivalent.
     """
     counts = Counter(found)
     places = dict.fromkeys((one.claim, one.texture) for one in counts)
@@ -290,7 +280,7 @@ def power_table(found: Iterable[Verdict], *, simulations: int) -> pd.DataFrame:
             for one, hits in counts.items()
             if (one.claim, one.texture) == (claim, texture)
         }
-        shown = _shown(texture, of_place, by_model=(claim, MEAN_ALONE) in places)
+        shown = _shown(texture, of_place)
         for n in sorted({n for n, _ in of_place}):
             for verdict in (verdict for verdict in VERDICTS if verdict in shown):
                 hits = of_place.get((n, verdict), 0)
@@ -301,20 +291,17 @@ def power_table(found: Iterable[Verdict], *, simulations: int) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=names(POWER_COLUMNS))
 
 
-def _shown(texture: str, hits: Iterable[tuple[int, str]], *, by_model: bool) -> set[str]:
+def _shown(texture: str, hits: Iterable[tuple[int, str]]) -> set[str]:
     """The verdicts of one place of the table: those that came, and those that are always listed."""
-    alone = {EVERY_TEXTURE: EQUIVALENT, MEAN_ALONE: EQUAL_ON_AVERAGE}
-    if texture in alone:
-        return {alone[texture]}
-    equal = EQUAL_ON_AVERAGE if by_model and texture != ALL_TEXTURES else EQUIVALENT
-    return {verdict for _, verdict in hits} | {equal, INCONCLUSIVE}
+    if texture == EVERY_TEXTURE:
+        return {EQUIVALENT}
+    return {verdict for _, verdict in hits} | {EQUIVALENT, INCONCLUSIVE}
 
 
 def power_sentences(table: pd.DataFrame, *, claims: Sequence[Claim]) -> list[str]:
     """One line for each claim: the smallest n with sufficient power over all textures.
 
-    Where no n suffices, the line is for the largest n and states so. Where the model of the
-    participants decides, a claim of equivalence also says how often the mean alone lay inside.
+    Where no n suffices, the line is for the largest n and states so.
 
     Parameters
     ----------
@@ -335,12 +322,8 @@ def power_sentences(table: pd.DataFrame, *, claims: Sequence[Claim]) -> list[str
         n = enough.min() if len(enough) else own["n"].max()
         at_n = table[(table["claim"] == claim.name) & (table["n"] == n)]
         parts = [_chances(at_n[at_n["texture"] == ALL_TEXTURES])]
-        mean = at_n[at_n["texture"] == MEAN_ALONE]
-        if wanted == EQUIVALENT and len(mean):
-            parts.append(f"mean alone inside the bounds {_chance(mean.iloc[0])}")
         if not len(enough):
-            why = _too_few_people(at_n) if wanted == EQUIVALENT and len(mean) else ""
-            parts.append(f"{wanted} with {TARGET:.0%} is not reached{why}")
+            parts.append(f"{wanted} with {TARGET:.0%} is not reached")
         lines.append(f"{claim.name}: simulated: {n} participants: {'; '.join(parts)}")
     return lines
 
@@ -351,12 +334,3 @@ def _chances(rows: pd.DataFrame) -> str:
 
 def _chance(row: pd.Series) -> str:
     return f"{row['chance']:.2f} ({row['ci_low']:.2f}–{row['ci_high']:.2f})"
-
-
-def _too_few_people(rows: pd.DataFrame) -> str:
-    """Says so where the mean lies inside the bounds, but nothing is known of the people."""
-    overall = rows[rows["texture"] == ALL_TEXTURES].set_index("verdict")["chance"]
-    felt = overall.reindex(list(FELT_WORDS)).sum()
-    mean = rows[rows["texture"] == MEAN_ALONE]["chance"]
-    enough = mean.iloc[0] >= TARGET and overall[INCONCLUSIVE] > felt
-    return ", the study is too small to count people outside the bounds" if enough else ""

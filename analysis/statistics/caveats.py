@@ -11,12 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tactileq.analysis.statistics.equivalence import (
-    ALL_BUT,
-    AVERAGE_FELT,
     DIFFERENT,
-    EQUAL_ON_AVERAGE,
     EQUIVALENT,
-    FELT,
     WITHIN_BOUNDS,
     verdict,
 )
@@ -27,15 +23,13 @@ BOUNDS_WITHHELD = "different, bounds withheld"
 _WITHOUT_EQUALITY = {
     EQUIVALENT: WITHHELD,
     WITHIN_BOUNDS: BOUNDS_WITHHELD,
-    EQUAL_ON_AVERAGE: WITHHELD,
-    AVERAGE_FELT: FELT,
-    ALL_BUT: FELT,
 }
 EQUALITY = tuple(_WITHOUT_EQUALITY)
 WITHOUT_EQUALITY = (WITHHELD, BOUNDS_WITHHELD)
 DIFFERENCES = (DIFFERENT, WITHIN_BOUNDS, BOUNDS_WITHHELD)
 SHOWN, NOT_TESTED = "shown", "sensitivity not tested"
 INTERIM = "interim, no verdict"
+NOT_CONVERGED = "no verdict, sampler not converged"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,12 +14,9 @@ import pandas as pd
 from tactileq.analysis.answers.plan import MODEL_RULE, TESTS_RULE, Claim
 from tactileq.analysis.columns import TEXTURE, P
 from tactileq.analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES
-from tactileq.analysis.statistics.caveats import Caveats
+from tactileq.analysis.statistics.caveats import NOT_CONVERGED, Caveats
 from tactileq.analysis.statistics.equivalence import (
     ALPHA,
-    EQUAL_ON_AVERAGE,
-    EQUIVALENT,
-    WITHIN_BOUNDS,
     Bounds,
     bayes_factor_null,
     equivalence_test,
@@ -30,11 +27,9 @@ from tactileq.analysis.statistics.paired import (
     ignoring_case,
     paired_test,
     participant_means,
-    t_tests,
-    why_undefined,
-    without_rounding_noise,
 )
 from tactileq.analysis.statistics.participants.verdict import PeopleFound, PeopleJudged
+from tactileq.analysis.statistics.people import people_test
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.files.columns import Column, chosen, names
 
@@ -81,15 +76,18 @@ CLAIM_COLUMNS = (
     Column("excluded"),
     Column("rule", is_name=True),
     Column("tests_verdict", "verdict of the tests", is_name=True),
+    Column("model_verdict", "verdict of the model", is_name=True),
     Column("model_mean", "mean effect by the model"),
     Column("model_low", "95% interval from"),
     Column("model_high", "to"),
-    Column("share_outside", "share of people outside the bounds", format=".2f"),
-    Column("share_low", "95% interval from", format=".2f"),
-    Column("share_high", "to", format=".2f"),
-    Column("share_most", "at most (95%)", format=".2f"),
-    Column("somebody", "probability that somebody is", format=".2f"),
     Column("p_of_model", "probability of a mean beyond a bound", is_p_value=True),
+    Column("people_sd", "SD between people"),
+    Column("people_sd_low", "95% interval from"),
+    Column("people_sd_high", "to"),
+    Column("people_f", "F of people"),
+    Column("people_df", "df", format=".0f"),
+    Column("people_df_rest", "and", format=".0f"),
+    Column("people_p", "p of F", is_p_value=True),
     Column("note"),
 )
 
@@ -114,10 +112,17 @@ class Values:
     share_at_ends : mapping of texture to float
         Share of single answers of both models that lie at an end of the scale; `ALL_TEXTURES` is
         that of all that are compared. Empty of a measure that has no ends.
+    contrasts : DataFrame
+        `crossover.day_contrasts`; without columns where models were not on different days.
     """
 
     table: pd.DataFrame
     share_at_ends: dict[str, float] = field(default_factory=dict)
+    contrasts: pd.DataFrame = field(default_factory=pd.DataFrame)
+
+    def contrasts_of(self, participants: pd.Series | pd.Index) -> Floats:
+        """(n, c) days of these participants."""
+        return np.asarray(self.contrasts.reindex(participants).to_numpy(dtype=float))
 
 
 def claim_tests(
@@ -154,6 +159,8 @@ def claim_tests(
             measure=MEASURES[claim.measure],
             planned="yes" if claim.planned else "no",
             rule="" if caveats.unfinished else TESTS_RULE,
+            tests_verdict="" if caveats.unfinished else table["verdict"].to_numpy(),
+            model_verdict="",
             reference=reference,
             other=other,
             bound_low=low,
@@ -172,11 +179,14 @@ def _tests(
     rng: np.random.Generator,
 ) -> pd.DataFrame:
     """The row over all textures, and a row for each."""
-    overall = _row(_over_textures(compared), claim.bounds, rng=rng)
+    overall = _row(_over_textures(compared), claim.bounds, values=values, rng=rng)
     overall |= {"texture": ALL_TEXTURES, "p_holm": overall["p"]}
     overall["p_equivalence_holm"] = overall["p_equivalence"]
+    apart = people_test(differences_of(compared).to_numpy(dtype=float))
+    overall |= {"people_f": apart.f, "people_p": apart.p}
+    overall |= {"people_df": apart.df_people, "people_df_rest": apart.df_rest}
     textures = pd.DataFrame(
-        {"texture": texture, **_row(rows, claim.bounds, rng=rng)}
+        {"texture": texture, **_row(rows, claim.bounds, values=values, rng=rng)}
         for texture, rows in compared.groupby("texture", sort=False)
     ).sort_values("texture", key=ignoring_case)
     textures["p_holm"] = holm(textures["p"])
@@ -191,9 +201,9 @@ def _tests(
 
 
 def with_people(
-    tests: pd.DataFrame, found: PeopleFound, claim: Claim, *, caveats: Caveats, few: float
+    tests: pd.DataFrame, found: PeopleFound, claim: Claim, *, caveats: Caveats, decides: bool
 ) -> pd.DataFrame:
-    """The tests of a claim, with the verdicts of the model of the participants.
+    """The tests of a claim beside the model of the participants.
 
     Parameters
     ----------
@@ -201,17 +211,17 @@ def with_people(
         From `claim_tests`.
     claim : Claim
         With bounds.
-    few : float
-        Of the plan.
+    decides : bool
+        Whether the model's verdict is that on the claim, or stands beside that of the tests.
 
     Returns
     -------
     DataFrame
-        `CLAIM_COLUMNS`. The verdicts of the tests stay in `tests_verdict`. Posterior probabilities
-        of the single textures are corrected after Holm, as p values are.
+        `CLAIM_COLUMNS`. Posterior probabilities of the single textures are corrected after Holm, as
+        p values are.
     """
     assert claim.bounds is not None
-    summary, table = found.summary, tests.assign(tests_verdict=tests["verdict"])
+    summary, table = found.summary, tests.copy()
     of_model = found.textures.set_index("texture").reindex(table["texture"]).reset_index(drop=True)
     overall = (table["texture"] == ALL_TEXTURES).to_numpy()
     judged = (~overall) & (table["verdict"] != CONTROL).to_numpy()
@@ -221,11 +231,14 @@ def with_people(
         textures=list(table["texture"][judged]),
         shares=dict(zip(table["texture"], table["share_at_ends"].astype(float), strict=True)),
         caveats=caveats,
-        few=few,
     )
-    decided = overall | judged
-    table.loc[decided, "verdict"] = table["texture"][decided].map(words)
-    table["rule"] = np.where(decided, MODEL_RULE, "")
+    both = overall | judged
+    table.loc[both, "model_verdict"] = table["texture"][both].map(words)
+    if decides:
+        table.loc[both, "verdict"] = table["model_verdict"][both]
+        table["rule"] = np.where(both, MODEL_RULE, "")
+    if not summary.converged:
+        return table
     for column, name in (
         ("model_mean", "mean"),
         ("model_low", "ci_low"),
@@ -237,11 +250,9 @@ def with_people(
         "model_mean": summary.mean,
         "model_low": summary.mean_low,
         "model_high": summary.mean_high,
-        "share_outside": summary.share,
-        "share_low": summary.share_low,
-        "share_high": summary.share_high,
-        "share_most": summary.share_most,
-        "somebody": summary.somebody,
+        "people_sd": summary.sd,
+        "people_sd_low": summary.sd_low,
+        "people_sd_high": summary.sd_high,
     }
     for column, value in row.items():
         table.loc[overall, column] = value
@@ -255,7 +266,6 @@ def words_of_people(
     textures: Sequence[str],
     shares: Mapping[str, float],
     caveats: Caveats,
-    few: float,
 ) -> dict[str, str]:
     """The verdicts of the model of the participants: over all textures, then on each.
 
@@ -266,15 +276,14 @@ def words_of_people(
         Those that are compared. Their posterior probabilities are corrected after Holm.
     shares : mapping of texture to float
         As `Values.share_at_ends`.
-    few : float
-        Of the plan.
     """
-    words = {ALL_TEXTURES: found.summary.verdict(bounds, few=few)}
+    if not found.summary.converged:
+        return dict.fromkeys((ALL_TEXTURES, *textures), caveats.allowed(NOT_CONVERGED))
+    words = {ALL_TEXTURES: found.summary.verdict(bounds)}
     known = found.textures.set_index("texture").reindex(list(textures))
     p = holm(known["p_difference"]), holm(known["p_equivalence"])
     for texture, differs, equals in zip(textures, *p, strict=True):
-        word = verdict(float(differs), float(equals))
-        words[texture] = EQUAL_ON_AVERAGE if word in (EQUIVALENT, WITHIN_BOUNDS) else word
+        words[texture] = verdict(float(differs), float(equals))
     return {
         texture: caveats.allowed(word, share_at_ends=shares.get(texture, np.nan))
         for texture, word in words.items()
@@ -326,24 +335,38 @@ def _over_textures(compared: pd.DataFrame) -> pd.DataFrame:
     return means.reset_index()
 
 
+def differences_of(compared: pd.DataFrame) -> pd.DataFrame:
+    """Other − reference: a row for each participant, a column for each texture."""
+    return compared.assign(difference=compared["other"] - compared["reference"]).pivot(
+        index="participant_id", columns="texture", values="difference"
+    )
+
+
 def _row(
-    rows: pd.DataFrame, bounds: Bounds | None, *, rng: np.random.Generator
+    rows: pd.DataFrame, bounds: Bounds | None, *, values: Values, rng: np.random.Generator
 ) -> dict[str, object]:
     """Both tests over the participants of one texture, or of the means over all."""
     both = rows.dropna(subset=["reference", "other"])
-    result = paired_test(both["reference"], both["other"], rng=rng)
-    differences = without_rounding_noise((both["other"] - both["reference"]).to_numpy(float))
-    low, high = float("nan"), float("nan")
-    if not why_undefined(differences):
-        *_, (low,), (high,) = t_tests(differences[None, :], confidence=1 - 2 * ALPHA)
-    equal = equivalence_test(differences, bounds, rng=rng).p if bounds else float("nan")
+    contrasts = values.contrasts_of(both["participant_id"])
+    result = paired_test(both["reference"], both["other"], rng=rng, contrasts=contrasts)
+    differences = (both["other"] - both["reference"]).to_numpy(float)
+    # The bounds do not matter to the interval; without them there is no p.
+    equal = equivalence_test(differences, bounds or (-1.0, 1.0), rng=rng, contrasts=contrasts)
+    days = contrasts[:, 0] if contrasts.shape[1] == 1 else np.empty(0)
+    groups = (int((days < 0).sum()), int((days > 0).sum()))
+    two = groups if days.size and min(groups) else None
+    no_factor = contrasts.shape[1] > 1  # of more than two days nobody has published one
+    factors = [
+        float("nan") if no_factor or result.df < 1 else bayes_factor_null(t, result.n, groups=two)
+        for t in (result.t, 0.0)
+    ]
     return {
         **asdict(result),
-        "ci90_low": low,
-        "ci90_high": high,
-        "p_equivalence": equal,
-        "bf01": bayes_factor_null(result.t, result.n),
-        "bf01_highest": bayes_factor_null(0.0, result.n) if result.n > 1 else float("nan"),
+        "ci90_low": equal.ci_low,
+        "ci90_high": equal.ci_high,
+        "p_equivalence": equal.p if bounds else float("nan"),
+        "bf01": factors[0],
+        "bf01_highest": factors[1],
         "excluded": ", ".join(sorted(set(rows["participant_id"]) - set(both["participant_id"]))),
     }
 
@@ -359,7 +382,7 @@ def _controls(
     rows = []
     for texture, of_texture in values.table.groupby("texture", sort=False):
         if texture in caveats.identical:
-            found = _row(of_texture, claim.bounds, rng=rng)
+            found = _row(of_texture, claim.bounds, values=values, rng=rng)
             kept = {name: found[name] for name in described}
             rows.append({"texture": texture, "verdict": CONTROL, "note": IDENTICAL, **kept})
     table = pd.DataFrame(rows).reindex(columns=names(CLAIM_COLUMNS))

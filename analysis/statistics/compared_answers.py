@@ -18,6 +18,7 @@ from tactileq.analysis.statistics.claims import (
     complete_means,
     share_at_ends,
 )
+from tactileq.analysis.statistics.crossover import day_contrasts
 from tactileq.modeling import InputError
 from tactileq.modeling.files.answer_tables import ANSWER_TABLES, ENDS, AnswerTable
 from tactileq.modeling.participants.choices import (
@@ -103,8 +104,11 @@ def claim_values(responses: Responses, claim: Claim) -> Values:
         both = answers.assign(model=claim.models[1])
         table = complete_means(both, claim.measure, models=claim.models, repeats=repeats)
         return Values(table=table.assign(reference=chance_of(claim.task, answers)))
-    table = complete_means(answers, claim.measure, models=claim.models, repeats=repeats)
-    return Values(table=table, share_at_ends=claim_shares(responses, claim))
+    return Values(
+        table=complete_means(answers, claim.measure, models=claim.models, repeats=repeats),
+        share_at_ends=claim_shares(responses, claim),
+        contrasts=day_contrasts(answers, claim.models),
+    )
 
 
 def claim_shares(responses: Responses, claim: Claim) -> dict[str, float]:

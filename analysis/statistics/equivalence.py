@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from tactileq.analysis.statistics.crossover import MeanDifferences, mean_differences
 from tactileq.analysis.statistics.paired import (
     sign_flips_p,
     t_tests,
@@ -17,15 +18,11 @@ from tactileq.modeling import InputError
 from tactileq.modeling.arrays import Floats
 
 ALPHA = 0.05
+WIDTH = 0.707  # of the Cauchy prior of d_z
 EQUIVALENT = "equivalent"
 DIFFERENT = "different"
 WITHIN_BOUNDS = "different but within bounds"
 INCONCLUSIVE = "inconclusive"
-# Said by the model of the participants alone (docs/method/participants.md#verdict).
-EQUAL_ON_AVERAGE = "equal on average"  # of single textures, whose people are not counted
-AVERAGE_FELT = "equal on average, felt by some"
-ALL_BUT = "equal for all but a few"
-FELT = "felt by some"
 Bounds = tuple[float, float]
 
 
@@ -53,7 +50,11 @@ class EquivalenceTest:
 
 
 def equivalence_test(
-    differences: Floats, bounds: Bounds, *, rng: np.random.Generator
+    differences: Floats,
+    bounds: Bounds,
+    *,
+    rng: np.random.Generator,
+    contrasts: Floats | None = None,
 ) -> EquivalenceTest:
     """Whether a mean difference lies within bounds.
 
@@ -67,6 +68,8 @@ def equivalence_test(
         In the unit of the differences, the lower below the upper one.
     rng : Generator
         Draws sign flips where more than 13 participants do not vary.
+    contrasts : (n, c) ndarray, optional
+        Days that differences are adjusted for (`crossover.day_contrasts`).
 
     Raises
     ------
@@ -78,27 +81,30 @@ def equivalence_test(
         raise InputError(
             f"expected a lower bound below the upper one, got {low:g} and {high:g}; exchange them."
         )
-    differences = without_rounding_noise(np.asarray(differences, dtype=float))
-    if why_undefined(differences):
+    rounded = without_rounding_noise(np.asarray(differences, dtype=float))
+    found = mean_differences(rounded[None, :], contrasts)
+    if why_undefined(found):
+        adjusted = found.adjusted[0]
         return EquivalenceTest(
             *(float("nan"),) * 3,
-            sign_flips_p(differences - low, rng=rng, alternative="greater"),
+            sign_flips_p(adjusted - low, rng=rng, alternative="greater"),
             float("nan"),
-            sign_flips_p(differences - high, rng=rng, alternative="less"),
+            sign_flips_p(adjusted - high, rng=rng, alternative="less"),
         )
-    (t_low,), (p_low,), (t_high,), (p_high,) = one_sided_tests(differences[None, :], bounds)
-    *_, (ci_low,), (ci_high,) = t_tests(differences[None, :], confidence=1 - 2 * ALPHA)
+    (t_low,), (p_low,), (t_high,), (p_high,) = one_sided_tests(found, bounds)
+    *_, (ci_low,), (ci_high,) = t_tests(found, confidence=1 - 2 * ALPHA)
     return EquivalenceTest(*map(float, (ci_low, ci_high, t_low, p_low, t_high, p_high)))
 
 
-def one_sided_tests(differences: Floats, bounds: Bounds) -> tuple[Floats, Floats, Floats, Floats]:
+def one_sided_tests(
+    differences: Floats | MeanDifferences, bounds: Bounds
+) -> tuple[Floats, Floats, Floats, Floats]:
     """t and p against the lower, then against the upper bound, (k,) each, of (k, n) differences."""
-    above = stats.ttest_1samp(differences, bounds[0], axis=1, alternative="greater")
-    below = stats.ttest_1samp(differences, bounds[1], axis=1, alternative="less")
-    t_low, p_low, t_high, p_high = np.array(
-        [above.statistic, above.pvalue, below.statistic, below.pvalue]
-    )
-    return t_low, p_low, t_high, p_high
+    found = differences
+    if not isinstance(found, MeanDifferences):
+        found = mean_differences(found)
+    t_low, t_high = ((found.mean - bound) / found.error for bound in bounds)
+    return t_low, stats.t.sf(t_low, found.df), t_high, stats.t.cdf(t_high, found.df)
 
 
 def verdict(p_difference: float, p_equivalence: float, *, alpha: float = ALPHA) -> str:
@@ -109,13 +115,17 @@ def verdict(p_difference: float, p_equivalence: float, *, alpha: float = ALPHA) 
     """
     if np.isnan(p_difference):
         return ""
-    differs, equals = p_difference < alpha, p_equivalence < alpha
+    return combined(differs=p_difference < alpha, equals=p_equivalence < alpha)
+
+
+def combined(*, differs: bool, equals: bool) -> str:
+    """The word for what two tests, or two intervals, found."""
     if differs:
         return WITHIN_BOUNDS if equals else DIFFERENT
     return EQUIVALENT if equals else INCONCLUSIVE
 
 
-def bayes_factor_null(t: float, n: int) -> float:
+def bayes_factor_null(t: float, n: int, *, groups: tuple[int, int] | None = None) -> float:
     """How much more likely the data are without a difference than with one (JZS, r = 0.707).
 
     NaN where t is. docs/method/statistics.md#bayes-factor
@@ -126,9 +136,15 @@ def bayes_factor_null(t: float, n: int) -> float:
         Paired t value.
     n : int
         Participants, ≥ 2.
+    groups : (int, int), optional
+        How many of them began with either model, where models were on two days: t is then that of
+        two samples, of the differences of those and of minus the differences of these, whose
+        effect size, and so the prior's width, is twice d_z.
     """
     from pingouin import bayesfactor_ttest  # late: it takes a second to import
 
     if not np.isfinite(t):
         return float("nan")
-    return 1.0 / float(bayesfactor_ttest(t, n, paired=True))
+    if groups is not None:
+        return 1.0 / float(bayesfactor_ttest(t, *groups, r=2 * WIDTH))
+    return 1.0 / float(bayesfactor_ttest(t, n, paired=True, r=WIDTH))

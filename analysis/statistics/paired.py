@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from scipy import special, stats
 
+from tactileq.analysis.statistics.crossover import CONFOUNDED, MeanDifferences, mean_differences
 from tactileq.modeling import InputError
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.errors import counted
@@ -27,8 +28,9 @@ class PairedTest:
 
     Differences are other − reference, in the unit of the values. `ci_*` is the 95 % confidence
     interval of the mean difference; `d_z` is the mean difference over the standard deviation of
-    the differences. Where participants do not vary, t and what follows from it are NaN, `note` says
-    why, and `p` is that of the sign flips.
+    the differences; all three are apart from days, where models were on different ones. Where
+    participants do not vary, t and what follows from it are NaN, `note` says why, and `p` is that
+    of the sign flips.
     """
 
     n: int
@@ -52,7 +54,13 @@ class PairedTest:
     note: str
 
 
-def paired_test(reference: ArrayLike, other: ArrayLike, *, rng: np.random.Generator) -> PairedTest:
+def paired_test(
+    reference: ArrayLike,
+    other: ArrayLike,
+    *,
+    rng: np.random.Generator,
+    contrasts: Floats | None = None,
+) -> PairedTest:
     """Paired t-test and effect size d_z; Wilcoxon's signed-rank test and sign flips beside it.
 
     docs/method/statistics.md#paired-tests
@@ -63,6 +71,8 @@ def paired_test(reference: ArrayLike, other: ArrayLike, *, rng: np.random.Genera
         One finite value per participant, in the same order.
     rng : Generator
         Draws the sign flips of more than 13 participants.
+    contrasts : (n, c) ndarray, optional
+        Days that differences are adjusted for (`crossover.day_contrasts`).
 
     Raises
     ------
@@ -77,10 +87,11 @@ def paired_test(reference: ArrayLike, other: ArrayLike, *, rng: np.random.Genera
             f"expected two lists of finite values of one length, got {what}; leave participants "
             "out of both where one value is missing."
         )
-    differences = without_rounding_noise(after - before)
-    undefined = why_undefined(differences)
-    t, p, low, high = (np.nan,) * 4 if undefined else t_test(differences)
-    d_low, d_high = (np.nan, np.nan) if undefined else d_z_interval(t, differences.size)
+    found = mean_differences(without_rounding_noise(after - before)[None, :], contrasts)
+    undefined = why_undefined(found)
+    t, p, low, high = (np.nan,) * 4 if undefined else _first(t_tests(found))
+    d_low, d_high = (np.nan, np.nan) if undefined else d_z_interval(t, found.size, df=found.df)
+    differences = found.adjusted[0][: 0 if found.confounded else None]
     wilcoxon_w, wilcoxon_p = wilcoxon(differences, rng=rng)
     flipped_p = sign_flips_p(differences, rng=rng)
     return PairedTest(
@@ -89,13 +100,13 @@ def paired_test(reference: ArrayLike, other: ArrayLike, *, rng: np.random.Genera
         se_reference=standard_error(before),
         mean_other=mean(after),
         se_other=standard_error(after),
-        mean_difference=mean(differences),
+        mean_difference=float(found.mean[0]),
         ci_low=low,
         ci_high=high,
         t=t,
-        df=max(before.size - 1, 0),
+        df=max(found.df, 0),
         p=flipped_p if undefined else p,
-        d_z=float(t / np.sqrt(differences.size)) if differences.size else np.nan,
+        d_z=float(t / np.sqrt(found.size)) if differences.size else np.nan,
         d_z_low=d_low,
         d_z_high=d_high,
         shapiro_p=_shapiro(differences),
@@ -119,15 +130,19 @@ def t_interval(values: Floats) -> tuple[float, float]:
     return float(values.mean() - half), float(values.mean() + half)
 
 
-def d_z_interval(t: float, n: int, *, confidence: float = CONFIDENCE) -> tuple[float, float]:
+def d_z_interval(
+    t: float, n: float, *, df: int | None = None, confidence: float = CONFIDENCE
+) -> tuple[float, float]:
     """Confidence interval of d_z = t/√n by inverting the noncentral t distribution.
 
     Parameters
     ----------
     t : float
         Paired t value.
-    n : int
-        Pairs, ≥ 2.
+    n : float
+        Pairs, ≥ 2; `MeanDifferences.size` where days count.
+    df : int, optional
+        n − 1 without it.
     confidence : float
         0 … 1.
 
@@ -137,7 +152,8 @@ def d_z_interval(t: float, n: int, *, confidence: float = CONFIDENCE) -> tuple[f
     upper and lower tail.
     """
     tail = (1 - confidence) / 2
-    low, high = special.nctdtrinc(n - 1, [1 - tail, tail], t) / np.sqrt(n)
+    df = round(n) - 1 if df is None else df
+    low, high = special.nctdtrinc(df, [1 - tail, tail], t) / np.sqrt(n)
     return float(low), float(high)
 
 
@@ -184,8 +200,7 @@ def participant_means(table: pd.DataFrame, column: str) -> pd.DataFrame:
 
 def t_test(differences: Floats) -> tuple[float, float, float, float]:
     """t, two-sided p and the confidence limits of the mean."""
-    t, p, low, high = (float(values[0]) for values in t_tests(differences[None, :]))
-    return t, p, low, high
+    return _first(t_tests(differences[None, :]))
 
 
 def mean_test(differences: Floats, *, rng: np.random.Generator) -> tuple[float, float]:
@@ -198,12 +213,19 @@ def mean_test(differences: Floats, *, rng: np.random.Generator) -> tuple[float, 
 
 
 def t_tests(
-    differences: Floats, *, confidence: float = CONFIDENCE
+    differences: Floats | MeanDifferences, *, confidence: float = CONFIDENCE
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """The same of each row of (k, n) differences, (k,) each."""
-    result = stats.ttest_1samp(differences, 0.0, axis=1)
-    interval = result.confidence_interval(confidence)
-    t, p, low, high = np.array([result.statistic, result.pvalue, interval.low, interval.high])
+    found = differences
+    if not isinstance(found, MeanDifferences):
+        found = mean_differences(found)
+    t = found.mean / found.error
+    half = found.error * stats.t.ppf((1 + confidence) / 2, found.df)
+    return t, 2 * stats.t.sf(np.abs(t), found.df), found.mean - half, found.mean + half
+
+
+def _first(values: tuple[Floats, Floats, Floats, Floats]) -> tuple[float, float, float, float]:
+    t, p, low, high = (float(one[0]) for one in values)
     return t, p, low, high
 
 
@@ -264,11 +286,17 @@ def without_rounding_noise(differences: Floats) -> Floats:
     return rounded
 
 
-def why_undefined(differences: Floats) -> str:
-    """Why no t-test can be made of these differences; empty where one can."""
-    if differences.size < 2:
-        return f"t undefined: {counted(differences.size, 'participant')}"
-    if np.ptp(differences) == 0:
+def why_undefined(differences: Floats | MeanDifferences) -> str:
+    """Why no t-test can be made of these differences of one sample; empty where one can."""
+    found = differences
+    if not isinstance(found, MeanDifferences):
+        found = mean_differences(found[None, :])
+    count = found.adjusted.shape[1]
+    if found.confounded:
+        return CONFOUNDED
+    if found.df < 1:
+        return f"t undefined: {counted(count, 'participant')}"
+    if np.ptp(found.adjusted) == 0:
         return "t undefined: no variation between participants"
     return ""
 

@@ -147,7 +147,7 @@ def bootstrap_intervals(rates: Floats, rng: np.random.Generator) -> tuple[Floats
     return np.asarray(interval.low), np.asarray(interval.high)
 
 
-def clopper_pearson(hits: int, of: int) -> tuple[float, float]:
-    """Exact 95 % interval of a probability by `hits` of `of` (Clopper and Pearson 1934)."""
-    interval = stats.binomtest(hits, of).proportion_ci(CONFIDENCE, method="exact")
+def clopper_pearson(hits: int, of: int, *, confidence: float = CONFIDENCE) -> tuple[float, float]:
+    """Exact interval of a probability by `hits` of `of` (Clopper and Pearson 1934)."""
+    interval = stats.binomtest(hits, of).proportion_ci(confidence, method="exact")
     return float(interval.low), float(interval.high)

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from tactileq.analysis.answers.plan import MODEL_RULE, AnalysisPlan, Claim
+from tactileq.analysis.answers.plan import MODEL_RULE, TESTS_RULE, Claim
 from tactileq.analysis.answers.responses import Responses
 from tactileq.analysis.labels import ALL_TEXTURES, SCALES
 from tactileq.analysis.page.sections import Mapped
@@ -25,8 +25,9 @@ from tactileq.analysis.statistics.compared_answers import (
     answers_about,
     chance_of,
     claim_values,
-    decision_model,
+    repeats_of,
 )
+from tactileq.analysis.statistics.crossover import balanced, day_contrasts
 from tactileq.analysis.statistics.draws import generators
 from tactileq.analysis.statistics.equivalence import ALPHA
 from tactileq.analysis.statistics.paired import (
@@ -36,13 +37,21 @@ from tactileq.analysis.statistics.paired import (
 )
 from tactileq.analysis.statistics.participants.design import (
     PeopleData,
-    choice_studies,
     rating_studies,
     textures_of,
 )
 from tactileq.analysis.statistics.participants.verdict import FEWEST, PeopleFound, people_found
+from tactileq.analysis.statistics.people import (
+    PeopleCount,
+    beyond_bounds_by_ratings,
+    beyond_share,
+    counted_people,
+    repeats_for_ratings,
+    repeats_for_shares,
+)
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.files.answer_tables import ANSWER_TABLES
+from tactileq.modeling.participants.ratings import RatingPriors
 from tactileq.modeling.seeds import number_of
 
 Row = Mapping[Hashable, Any]
@@ -59,9 +68,13 @@ class ClaimFound:
     values : DataFrame
         texture, participant_id, reference, other.
     people : PeopleFound, optional
-        Where the model of the participants decides.
-    few : float
-        Share of people outside the bounds below which they do not count, of the plan.
+        What the model of the participants says, where it decides or stands beside the tests.
+    by_model : bool
+        Whether it decides.
+    by_day : bool
+        Whether the two models were on different days.
+    people_count : PeopleCount, optional
+        Of ratings, and of right answers to trials that hold both models.
     """
 
     claim: Claim
@@ -69,7 +82,9 @@ class ClaimFound:
     values: pd.DataFrame
     caveats: Caveats
     people: PeopleFound | None = None
-    few: float = AnalysisPlan.few
+    by_model: bool = False
+    by_day: bool = False
+    people_count: PeopleCount | None = None
 
 
 def overall_row(found: ClaimFound) -> Row | None:
@@ -100,13 +115,15 @@ class ClaimsBegun:
 
     Parameters
     ----------
+    data : sequence of PeopleData or None
+        Of each claim what the model of the participants takes, where it is asked.
     sampled : iterator of PeopleFound
-        Of the claims that the model decides, in order.
+        Of these claims, in order.
     """
 
     responses: Responses
     claims: Sequence[Claim]
-    by_model: Sequence[bool]
+    data: Sequence[PeopleData | None]
     sampled: Iterator[PeopleFound]
     own: Mapping[str, np.random.Generator]
 
@@ -117,55 +134,51 @@ class ClaimsBegun:
         """Of `claims_found`; `mapped` runs the samplers, and changes no result."""
         own = generators(rng)
         claims = all_claims(responses)
-        samplers = [_sampler_of(responses, claim, rng=rng) for claim in claims]
-        sampled = mapped(_called, [sampler for sampler in samplers if sampler is not None])
-        by_model = [sampler is not None for sampler in samplers]
-        return cls(responses, claims, by_model, iter(sampled), own)
+        data = [
+            None if claim.task in responses.unfinished else people_data(responses, claim)
+            for claim in claims
+        ]
+        samplers = [
+            _sampler_of(one, claim, rng=rng)
+            for claim, one in zip(claims, data, strict=True)
+            if one is not None
+        ]
+        return cls(responses, claims, data, iter(mapped(_called, samplers)), own)
 
     def found(self) -> list[ClaimFound]:
-        """The claims with their tests and, where the model decides, what it says of people."""
+        """The claims with their tests and, where it is asked, what the model says of people."""
         return [
-            self._found(claim, by_model)
-            for claim, by_model in zip(self.claims, self.by_model, strict=True)
+            self._found(claim, data) for claim, data in zip(self.claims, self.data, strict=True)
         ]
 
-    def _found(self, claim: Claim, by_model: bool) -> ClaimFound:
-        responses, rng, few = self.responses, self.own[claim.task], self.responses.plan.few
+    def _found(self, claim: Claim, data: PeopleData | None) -> ClaimFound:
+        responses, rng = self.responses, self.own[claim.task]
         values = claim_values(responses, claim)
         caveats = claim_caveats(responses, claim, rng=rng)
         tests = claim_tests(claim, values, caveats=caveats, rng=rng)
-        people = next(self.sampled) if by_model else None
+        people = next(self.sampled) if data is not None else None
+        decides = data is not None and data.decides
         if people is not None:
-            tests = with_people(tests, people, claim, caveats=caveats, few=few)
+            tests = with_people(tests, people, claim, caveats=caveats, decides=decides)
         return ClaimFound(
             claim=claim,
             tests=tests,
             values=values.table,
             caveats=caveats,
             people=people,
-            few=few,
+            by_model=decides,
+            by_day=bool(values.contrasts.shape[1]),
+            people_count=_people_count(responses, claim),
         )
 
 
 def _sampler_of(
-    responses: Responses, claim: Claim, *, rng: np.random.Generator
-) -> Callable[[], PeopleFound] | None:
-    """What draws from the posterior of a claim; None where the model does not decide it."""
-    if claim.task in responses.unfinished:
-        return None
-    data = people_data(responses, claim)
-    if data is None or claim.bounds is None:
-        return None
+    data: PeopleData, claim: Claim, *, rng: np.random.Generator
+) -> Callable[[], PeopleFound]:
+    """What draws from the posterior of a claim."""
+    assert claim.bounds is not None
     own = np.random.default_rng([int(rng.integers(2**32)), number_of(claim.name)])
-    return partial(
-        people_found,
-        data.studies,
-        claim.bounds,
-        model=data.model,
-        people=data.people,
-        textures=data.textures,
-        rng=own,
-    )
+    return partial(people_found, data, claim.bounds, rng=own)
 
 
 def _called(sampler: Callable[[], PeopleFound]) -> PeopleFound:
@@ -174,12 +187,14 @@ def _called(sampler: Callable[[], PeopleFound]) -> PeopleFound:
 
 
 def people_data(responses: Responses, claim: Claim) -> PeopleData | None:
-    """Every answer about a claim, complete or not; None where the plan's rule is not the model's.
+    """Every rating about a claim, complete or not; None where the plan's rule is that of tests.
 
-    Nor is there any of a task whose decision model is unknown, of claims without bounds, of fewer
-    than eight people, or where all models are identical.
+    Nor is there any of claims about right answers or without bounds, of fewer than eight people,
+    or where all models are identical.
     """
-    if responses.plan.rule != MODEL_RULE or not claim.planned or claim.bounds is None:
+    if responses.plan.rule == TESTS_RULE or not claim.planned or claim.bounds is None:
+        return None
+    if claim.measure not in SCALES:
         return None
     same = list(responses.identical(claim.models))
     answers = answers_about(responses, claim)
@@ -189,16 +204,51 @@ def people_data(responses: Responses, claim: Claim) -> PeopleData | None:
     checks = checks[checks["participant_id"].isin(people)]
     if len(people) < FEWEST:
         return None
-    textures = textures_of(answers)
-    if claim.measure in SCALES:
-        ratings = rating_studies(answers, checks, claim.measure, models=claim.models, people=people)
-        return PeopleData(studies=ratings, model=None, people=people, textures=textures)
-    model = decision_model(claim.task, answers)
-    if model is None:
+    even = balanced(day_contrasts(answers, claim.models))
+    return PeopleData(
+        studies=rating_studies(answers, checks, claim.measure, models=claim.models, people=people),
+        people=people,
+        textures=textures_of(answers),
+        decides=even and responses.plan.rule == MODEL_RULE,
+    )
+
+
+def _people_count(responses: Responses, claim: Claim) -> PeopleCount | None:
+    """How many participants differ by more than the bounds of a claim; None where it has none.
+
+    docs/method/statistics.md#people
+    """
+    both = ANSWER_TABLES[claim.task].both_models
+    if claim.bounds is None or claim.task in responses.unfinished:
         return None
-    compared = claim.models[1:] if model.both_models else claim.models
-    choices = choice_studies(answers, checks, models=compared, people=people)
-    return PeopleData(studies=choices, model=model, people=people, textures=textures)
+    if not (both or claim.measure in SCALES):
+        return None
+    answers = answers_about(responses, claim)
+    answers = answers[~answers["texture"].isin(list(responses.identical(claim.models)))]
+    answers = answers[answers[claim.measure].notna()]
+    people = sorted(answers["participant_id"].unique())
+    if not people:
+        return None
+    repeats = repeats_of(responses, claim.task)
+    size = {"people": len(people), "textures": int(answers["texture"].nunique())}
+    if both:
+        chance = chance_of(claim.task, answers)
+        if np.isnan(chance):
+            return None
+        needed = repeats_for_shares(claim.bounds, chance=chance, **size)
+        counts = answers.groupby("participant_id")["correct"].agg(["sum", "count"])
+        right, asked = counts.to_numpy(dtype=float).T
+        p = beyond_share(right, asked, chance + claim.bounds[1])
+        beyond, of = counted_people(p) if repeats >= needed else (0, 0)
+        return PeopleCount(repeats=repeats, needed=needed, beyond=beyond, people=of)
+    needed = repeats_for_ratings(claim.bounds, rating_sd=RatingPriors().rating_sd, **size)
+    by_day = bool(day_contrasts(answers, claim.models).shape[1])
+    beyond, of = 0, 0
+    if repeats >= needed and not by_day:
+        nobody = answers[:0]
+        own = rating_studies(answers, nobody, claim.measure, models=claim.models, people=people)
+        beyond, of = counted_people(beyond_bounds_by_ratings(own.values[0], claim.bounds))
+    return PeopleCount(repeats=repeats, needed=needed, by_day=by_day, beyond=beyond, people=of)
 
 
 def claim_caveats(responses: Responses, claim: Claim, *, rng: np.random.Generator) -> Caveats:

@@ -45,10 +45,11 @@ def planned_for(plan: Study, sizes: Sequence[int]) -> Study:
     Raises
     ------
     ValueError
-        If there is no claim, a claim is about a task that compares no models, or a number of
-        participants is too small for the rule of the plan or leaves the order of models unbalanced.
+        If there is no claim, a claim is about a task that compares no models, the rule of the plan
+        was withdrawn, or a number of participants is too small for it or leaves the order of models
+        unbalanced.
     """
-    from tactileq.experiments.study.study import FEWEST_OF_MODEL
+    from tactileq.experiments.study.study import FEWEST_OF_MODEL, asks_the_model
     from tactileq.modeling.files.answer_tables import ANSWER_TABLES
 
     if not plan.plan.claims:
@@ -62,10 +63,12 @@ def planned_for(plan: Study, sizes: Sequence[int]) -> Study:
                 f"expected claims about tasks that compare models, got {claim.name} about "
                 f"{claim.task}; leave it out."
             )
-    if plan.plan.rule == "model" and min(sizes) < FEWEST_OF_MODEL:
+    plan.plan.require_current()
+    by_model = any(asks_the_model(plan.plan, claim) for claim in plan.plan.claims)
+    if by_model and min(sizes) < FEWEST_OF_MODEL:
         raise ValueError(
-            f'expected {FEWEST_OF_MODEL} participants or more, as the rule of the plan is "model", '
-            f"got {min(sizes)}; correct --subjects."
+            f"expected {FEWEST_OF_MODEL} participants or more, as the rule of the plan is "
+            f'"{plan.plan.rule}", got {min(sizes)}; correct --subjects.'
         )
     tasks = {claim.task for claim in plan.plan.claims}
     for n in sizes:  # each has to be a study that can be run

@@ -1,88 +1,72 @@
-"""The model of the participants on planted truth that was not made for it.
+"""The rule of verdicts on planted truth that was not made for it.
 
-docs/method/validation.md#the-model-of-the-participants
+docs/method/validation.md#the-rule-of-verdicts
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from math import sqrt
+from math import nan
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
-from tactileq.analysis.statistics.caveats import EQUALITY, SHOWN, Caveats
-from tactileq.analysis.statistics.equivalence import (
-    ALL_BUT,
-    ALPHA,
-    AVERAGE_FELT,
-    DIFFERENT,
-    EQUIVALENT,
-    FELT,
-    INCONCLUSIVE,
-    one_sided_tests,
+from tactileq.analysis.labels import ALL_TEXTURES
+from tactileq.analysis.statistics.caveats import DIFFERENCES, EQUALITY, SHOWN, Caveats
+from tactileq.analysis.statistics.claims import words_of_people
+from tactileq.analysis.statistics.crossover import mean_differences
+from tactileq.analysis.statistics.equivalence import one_sided_tests, verdict
+from tactileq.analysis.statistics.paired import holm, t_tests
+from tactileq.analysis.statistics.participants.posterior import Draws, sufficient_draws
+from tactileq.analysis.statistics.participants.verdict import (
+    PeopleJudged,
+    summary_of,
+    texture_table,
 )
-from tactileq.analysis.statistics.participants.posterior import (
-    Draws,
-    Effort,
-    choice_draws,
-    rating_draws,
-)
-from tactileq.analysis.statistics.participants.verdict import PeopleSummary, summary_of
-from tactileq.benches.validation.people.held_out import HELD_OUT
-from tactileq.benches.validation.people.situations import (
-    CHOICE_KIND,
-    ODDITY_KIND,
-    RATING_KIND,
-    SITUATIONS,
-    DrawnStudies,
-    Situation,
-)
-from tactileq.modeling.arrays import Bools, Floats
+from tactileq.analysis.statistics.rates import clopper_pearson
+from tactileq.benches.validation.people.choices import CHOICE_WORLDS
+from tactileq.benches.validation.people.drawn import N_TEXTURES, DrawnStudies, World
+from tactileq.benches.validation.people.held_out import OTHER_WORLDS
+from tactileq.benches.validation.people.ratings import RATING_WORLDS
+from tactileq.modeling.arrays import Floats
 from tactileq.modeling.checks import check_whole
 from tactileq.modeling.files.columns import Column, names
-from tactileq.modeling.participants.choices import ODDITY, ChoiceStudies, forced_choice
 from tactileq.modeling.participants.ratings import RatingStudies
 from tactileq.modeling.seeds import generator, number_of
 
 SIZES = (20, 36)
-FEW = 0.15
-AT_ONCE = 100  # studies that are sampled side by side
-EFFORT = Effort(chains=1, warm_up=200, steps=450, every=3)
-FELT_WORDS = (AVERAGE_FELT, ALL_BUT, FELT)
+AT_ONCE = 50  # studies that are sampled side by side
+SURE = 0.99  # of the interval that an aim has to lie in
+TEXTURES = tuple(f"texture {place + 1}" for place in range(N_TEXTURES))
+WORLDS: Mapping[str, World] = {**RATING_WORLDS, **OTHER_WORLDS, **CHOICE_WORLDS}
 
 MODEL_COLUMNS = (
-    Column("situation", is_name=True),
+    Column("world", is_name=True),
     Column("n"),
     Column("simulations"),
+    Column("rule", is_name=True),
     Column("planted", "planted mean effect", format=".3f"),
-    Column("outside", "planted share of people outside", format=".3f"),
     Column("coverage", "mean covered by 95% interval", format=".3f"),
-    Column("share_covered", "share below its 95% limit", format=".3f"),
-    Column("inside", "mean said to be inside", format=".3f"),
-    Column("tests_inside", "by TOST", format=".3f"),
-    Column("equality", "a word of equality", format=".3f"),
-    Column("equivalent", format=".3f"),
-    Column("felt", "felt by some, or all but a few", format=".3f"),
-    Column("different", format=".3f"),
-    Column("inconclusive", format=".3f"),
-    Column("careless", "people held to be careless", format=".3f"),
-    Column("held_out", "held out", is_name=True),
+    Column("sd_coverage", "SD between people covered", format=".3f"),
+    Column("equal", "mean equal", format=".3f"),
+    Column("tests_equal", "by tests", format=".3f"),
+    Column("different", "mean different", format=".3f"),
+    Column("tests_different", "by tests", format=".3f"),
+    Column("texture_different", "a texture without effect called different", format=".3f"),
+    Column("tests_texture_different", "by tests", format=".3f"),
+    Column("texture_equal", "a texture at a bound called equal", format=".3f"),
+    Column("tests_texture_equal", "by tests", format=".3f"),
+    Column("withheld", "sampler not converged", format=".3f"),
+    Column("held_out", "written after the rule of", is_name=True),
     Column("missed", "aim missed", is_name=True),
 )
-Cell = tuple[str, int]  # situation, participants
-
-
-def all_situations() -> dict[str, Situation]:
-    """Those that the model was developed with, then those that were held out."""
-    return {**SITUATIONS, **HELD_OUT}
+Cell = tuple[str, int]  # world, participants
 
 
 def model_cells(*, sizes: Iterable[int] = SIZES) -> list[Cell]:
-    """The rows of the table, in order."""
-    return [(name, n) for name in all_situations() for n in sizes]
+    """The rows of the table, in order; groups of 13 and 7 of 20 people only."""
+    return [(name, n) for name in WORLDS for n in sizes if n == 20 or "13 and 7" not in name]
 
 
 def simulate_model_cell(cell: Cell, *, simulations: int, seed: int) -> dict[str, Any]:
@@ -104,151 +88,152 @@ def simulate_model_cell(cell: Cell, *, simulations: int, seed: int) -> dict[str,
     """
     check_whole("simulations", simulations, low=1, high=1_000_000)
     name, n = cell
-    situation = all_situations()[name]
-    parts = []
+    world, parts = WORLDS[name], []
     for start in range(0, simulations, AT_ONCE):
         rng = generator(seed, number_of(name), n, start)
-        drawn = situation(rng, (min(AT_ONCE, simulations - start), n))
-        parts.append(_judged(situation, drawn, rng=rng))
+        drawn = world(rng, (min(AT_ONCE, simulations - start), n))
+        parts.append(_judged(world, drawn, rng=rng))
     found = pd.concat(parts, ignore_index=True)
-    shares = {column: float(found[column].mean()) for column in found.columns}
     row = {
-        "situation": name,
+        "world": name,
         "n": n,
         "simulations": simulations,
-        "planted": drawn.mean,
-        "outside": drawn.outside,
-        "held_out": "yes" if name in HELD_OUT else "no",
-        **shares,
+        "rule": "hierarchical" if _by_model(world, drawn) else "tests",
+        "planted": float(drawn.planted.mean()),
+        "held_out": world.held_out,
+        **{column: float(found[column].mean()) for column in found.columns},
     }
     return {**row, "missed": "; ".join(_missed(row))}
 
 
-def _judged(situation: Situation, drawn: DrawnStudies, *, rng: np.random.Generator) -> pd.DataFrame:
+def _contrasts(drawn: DrawnStudies) -> Floats:
+    """(n, 1) −1 where the other model came first, +1 where last; (n, 0) with a single session."""
+    days = drawn.days[:, 0, :, 0]
+    apart = (days[:, 0] - days[:, 1]).astype(float)[:, None]
+    return apart if apart.any() else apart[:, :0]
+
+
+def _by_model(world: World, drawn: DrawnStudies) -> bool:
+    """Whether the model decides, as `verdicts.people_data` has it."""
+    return world.rated and not _contrasts(drawn).sum()
+
+
+def _judged(world: World, drawn: DrawnStudies, *, rng: np.random.Generator) -> pd.DataFrame:
     """What was said of each study: a row of shares or truth values for each."""
-    draws = posterior_of(situation, drawn, rng=rng)
-    differences = _differences(drawn)
-    sensitive = _sensitive(situation, drawn)
-    _, low, _, high = one_sided_tests(differences, situation.bounds)
-    rows = []
-    for one, shown, p in zip(draws, sensitive, np.maximum(low, high), strict=True):
-        summary = summary_of(one)
-        word = said(summary, situation, sensitive=bool(shown))
-        rows.append(
-            {
-                "coverage": _holds(summary.mean_low, drawn.mean, summary.mean_high),
-                "share_covered": _holds(0.0, drawn.outside, summary.share_most),
-                "inside": summary.inside(situation.bounds),
-                "tests_inside": p < ALPHA,
-                "equality": word in EQUALITY,
-                "equivalent": word == EQUIVALENT,
-                "felt": word in FELT_WORDS,
-                "different": word == DIFFERENT,
-                "inconclusive": word == INCONCLUSIVE,
-                "careless": 1 - one.attends.mean(),
-            }
-        )
-    return pd.DataFrame(rows).astype(float)
+    told, tested = _words_of_tests(world, drawn)
+    rows = [_said(words, world, drawn, by="tests_") for words in told]
+    own: list[dict[str, float]] = [
+        {"coverage": covered, "sd_coverage": nan, "withheld": 0.0} for covered in tested
+    ]
+    if _by_model(world, drawn):
+        caveats, own = Caveats(sensitivity=SHOWN), []
+        told = []
+        for draws in sufficient_draws(_studies(drawn), rng=rng):
+            summary = summary_of(draws)
+            table = texture_table(draws, world.bounds, textures=TEXTURES)
+            judged = PeopleJudged(summary=summary, textures=table)
+            told.append(
+                words_of_people(judged, world.bounds, textures=TEXTURES, shares={}, caveats=caveats)
+            )
+            own.append(_covered(draws, drawn))
+    return pd.DataFrame(
+        [
+            {**of_tests, **_said(words, world, drawn), **one}
+            for of_tests, words, one in zip(rows, told, own, strict=True)
+        ]
+    ).astype(float)
 
 
-def _holds(low: float, truth: float, high: float) -> float:
-    """Whether the truth lies between; NaN where nothing is planted."""
-    return float("nan") if np.isnan(truth) else float(low <= truth <= high)
+def _said(
+    words: Mapping[str, str], world: World, drawn: DrawnStudies, *, by: str = ""
+) -> dict[str, float]:
+    planted = dict(zip(TEXTURES, drawn.planted, strict=True))
+    at_bound = [name for name, one in planted.items() if np.isclose(abs(one), world.bounds[1])]
+    none = [name for name, one in planted.items() if not one]
+    shown = {
+        "different": (DIFFERENCES, [ALL_TEXTURES]),
+        "equal": (EQUALITY, [ALL_TEXTURES]),
+        "texture_different": (DIFFERENCES, none),
+        "texture_equal": (EQUALITY, at_bound if world.rated else []),
+    }
+    return {
+        f"{by}{column}": float(any(words[each] in which for each in of)) if of else nan
+        for column, (which, of) in shown.items()
+    }
 
 
-def said(summary: PeopleSummary, situation: Situation, *, sensitive: bool) -> str:
-    """The verdict as the report says it: without equality where sensitivity was not shown."""
-    caveats = Caveats(sensitivity=SHOWN if sensitive else "not shown")
-    return caveats.allowed(summary.verdict(situation.bounds, few=FEW))
+def _covered(draws: Draws, drawn: DrawnStudies) -> dict[str, float]:
+    summary = summary_of(draws)
+    if not summary.converged:
+        return {"coverage": nan, "sd_coverage": nan, "withheld": 1.0}
+    sd = drawn.people_sd
+    known = not np.isnan(sd + summary.sd)
+    return {
+        "coverage": float(summary.mean_low <= drawn.planted.mean() <= summary.mean_high),
+        "sd_coverage": float(summary.sd_low <= sd <= summary.sd_high) if known else nan,
+        "withheld": 0.0,
+    }
 
 
-def posterior_of(
-    situation: Situation, drawn: DrawnStudies, *, rng: np.random.Generator
-) -> list[Draws]:
-    """The posterior of each study of a batch."""
-    trends = _trends(drawn)
-    if situation.kind == RATING_KIND:
-        ratings = RatingStudies(values=drawn.values, anchors=drawn.checks, trends=trends)
-        return rating_draws(ratings, situation.bounds, rng=rng, effort=EFFORT)
-    choices = ChoiceStudies(
-        right=np.nansum(drawn.values, axis=-1),
-        asked=np.isfinite(drawn.values).sum(axis=-1).astype(float),
-        catch_right=np.nansum(drawn.checks, axis=-1),
-        catch_asked=np.isfinite(drawn.checks).sum(axis=-1).astype(float),
-        trends=trends.mean(axis=-1),
+def _studies(drawn: DrawnStudies) -> RatingStudies:
+    days = np.broadcast_to(drawn.days - drawn.days.mean(), drawn.values.shape)
+    return RatingStudies(
+        values=drawn.values,
+        anchors=drawn.anchors,
+        trends=np.stack([days, drawn.orders - 0.5]),
     )
-    model = ODDITY if situation.kind == ODDITY_KIND else forced_choice(drawn.values.shape[2])
-    return choice_draws(choices, model, situation.bounds, rng=rng, effort=EFFORT)
 
 
-def _trends(drawn: DrawnStudies) -> Floats:
-    axes = tuple(range(1, drawn.days.ndim))
-    days = drawn.days - drawn.days.mean(axis=axes, keepdims=True)
-    return np.stack([days, drawn.orders - 0.5])
-
-
-def _differences(drawn: DrawnStudies) -> Floats:
-    """(k, n) differences, as the paired tests take them."""
-    means = np.nanmean(drawn.values, axis=(2, 4))
-    reference = means[..., 0] if means.shape[-1] == 2 else ODDITY.chance
-    found: Floats = means[..., -1] - reference
-    return found
-
-
-def _sensitive(situation: Situation, drawn: DrawnStudies) -> Bools:
-    """(k,) whether different surfaces were told apart, as `verdicts` demands it."""
-    if situation.kind == CHOICE_KIND:
-        above = np.nanmean(drawn.values[:, :, :, 0], axis=(2, 3)) - 1 / drawn.values.shape[2]
-    elif not drawn.checks.shape[-1]:
-        return np.zeros(len(drawn.values), dtype=bool)
-    elif situation.kind == RATING_KIND:
-        above = np.nanmean(drawn.values, axis=(2, 3, 4)) - np.nanmean(drawn.checks, axis=-1)
-    else:
-        above = np.nanmean(drawn.checks, axis=-1) - ODDITY.chance
-    alike = np.ptp(above, axis=1) < 1e-12
-    p = np.where(above[:, 0] > 0, 0.5 ** above.shape[1], 1.0)  # of sign flips, where all are alike
-    vary = stats.ttest_1samp(above[~alike], 0.0, axis=1, alternative="greater").pvalue
-    p[~alike] = vary
-    found: Bools = p < ALPHA
-    return found
+def _words_of_tests(world: World, drawn: DrawnStudies) -> tuple[list[dict[str, str]], list[float]]:
+    """The verdicts of paired t and TOST, apart from days, and whether the interval covers."""
+    means = drawn.values.mean(axis=-1)
+    differences = means[..., 1] - means[..., 0]  # (k, n, T)
+    contrasts = _contrasts(drawn)
+    columns = [differences.mean(axis=2), *np.moveaxis(differences, 2, 0)]
+    p_difference, p_equivalence = [], []
+    for each in columns:
+        found = mean_differences(each, contrasts)
+        p_difference.append(t_tests(found)[1])
+        _, low, _, high = one_sided_tests(found, world.bounds)
+        p_equivalence.append(np.maximum(low, high))
+    *_, low, high = t_tests(mean_differences(columns[0], contrasts))
+    truth = drawn.planted.mean()
+    words = []
+    p = np.transpose([p_difference, p_equivalence], (2, 0, 1))
+    for differs, equals in p:
+        own = [(differs[0], equals[0]), *zip(holm(differs[1:]), holm(equals[1:]), strict=True)]
+        said = (verdict(float(a), float(b)) for a, b in own)
+        words.append(dict(zip((ALL_TEXTURES, *TEXTURES), said, strict=True)))
+    return words, ((low <= truth) & (truth <= high)).astype(float).tolist()
 
 
 def _missed(row: Mapping[str, Any]) -> list[str]:
-    """The aims that a row misses by more than two standard errors of the simulation."""
+    """The aims that do not lie in the 99 % interval of the simulated count."""
     missed = []
-    for quantity, low, high in aims(str(row["situation"]), int(row["n"]), row=row):
-        share = float(row[quantity])
-        nearest = low if share < low else high if share > high else share
-        error = sqrt(max(nearest * (1 - nearest), 0.0) / row["simulations"])
-        if abs(share - nearest) > 2 * error + 1e-12:
-            missed.append(f"{quantity} {share:.3f}, aim {low:.2f} to {high:.2f}")
+    for quantity, lowest, highest in aims(row):
+        share, count = float(row[quantity]), int(row["simulations"])
+        low, high = clopper_pearson(round(share * count), count, confidence=SURE)
+        if low > highest or high < lowest:
+            missed.append(f"{quantity} {share:.3f}, aim {lowest:.2f} to {highest:.2f}")
     return missed
 
 
-def aims(name: str, n: int, *, row: Mapping[str, Any]) -> list[tuple[str, float, float]]:
-    """What is asked of a situation: quantity, least and largest share of studies.
+def aims(row: Mapping[str, Any]) -> list[tuple[str, float, float]]:
+    """What is asked of a row: quantity, least and largest share of studies.
 
     docs/method/validation.md#aims
     """
-    which = name.partition(": ")[2]
-    bound = all_situations()[name].bounds[1]
-    found = []
-    if np.isclose(abs(float(row["planted"])), bound):
-        found += [("equality", 0.0, 0.06)]
-        found += [("coverage", 0.93, 0.97), ("inside", 0.0, 0.06)]
-    if which in ("split ± 10", "split", "1 person in 4"):
-        found += [("equivalent", 0.0, 0.05)]
-    if which == "1 person in 10" and n >= 36:
-        found += [("felt", 0.85, 1.0)]
-    if which in ("nobody", "nobody feels it", "nothing planted, SD 2"):
-        found += [("felt", 0.0, 0.05)]
-    if which == "nothing planted, SD 2" and n >= 36:
-        found += [("equivalent", 0.9, 1.0)]
-    if which.startswith("nothing planted, SD"):
-        found += [("inside", min(0.95 * float(row["tests_inside"]), 1.0), 1.0)]
-    if which.startswith("everybody at"):
-        found += [("equality", 0.0, 0.05)]
-    return found
+    world, planted = WORLDS[str(row["world"])], abs(float(row["planted"]))
+    bound = world.bounds[1]
+    found = [("coverage", 0.93, 0.97), ("sd_coverage", 0.92, 1.0), ("withheld", 0.0, 0.02)]
+    found += [("texture_different", 0.0, 0.06), ("texture_equal", 0.0, 0.06)]
+    if np.isclose(planted, bound):
+        found.append(("equal", 0.0, 0.06))
+    if planted == 0:
+        found += [("different", 0.0, 0.06), ("equal", 0.95 * float(row["tests_equal"]), 1.0)]
+    if np.isclose(planted, 2 * bound):
+        found.append(("different", 0.95 * float(row["tests_different"]), 1.0))
+    return [one for one in found if not np.isnan(float(row[one[0]]))]
 
 
 def model_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:

@@ -24,7 +24,7 @@ from tactileq.modeling import InputError
 from tactileq.modeling.checks import check_keys
 from tactileq.modeling.errors import shown
 from tactileq.modeling.files.answer_tables import ANSWER_TABLES
-from tactileq.modeling.files.claims import ClaimSection, PlanSection
+from tactileq.modeling.files.claims import RATINGS, WITHDRAWN, ClaimSection, PlanSection
 from tactileq.modeling.files.described import DescribedFile, FileSection, key
 from tactileq.modeling.files.hashes import sha256_of_values
 from tactileq.modeling.files.kinds import Label, ListedLabel, is_different, is_label, is_line
@@ -40,6 +40,12 @@ LONGEST_GAP_MIN = 30.0
 FEWEST_OF_MODEL = 8
 TWO_MODELS = {"full": "models", "simplified": "simplified"}
 SHIPPED_STUDY = Path(__file__).with_name("study.toml")
+
+
+def asks_the_model(plan: PlanSection, claim: ClaimSection) -> bool:
+    """Whether the model of the participants decides a claim: one about ratings, by its rule."""
+    return plan.rule == WITHDRAWN or (plan.rule != "tests" and claim.measure in RATINGS)
+
 
 Language = Annotated[str, key(pattern="^[a-z]{2,3}$", holds=is_line)]
 TextsFile = Annotated[str, key(pattern=r"(^|/)[a-z]{2,3}\.\w+$")]
@@ -251,11 +257,11 @@ class Study(DescribedFile):
                 f"expected models of [{claim.task}] ({', '.join(plan.models)}) in the claim "
                 f"{claim.name}, got {shown(unknown[0])}; correct it."
             )
-        if self.plan.rule == "model" and plan.participants < FEWEST_OF_MODEL:
+        if asks_the_model(self.plan, claim) and plan.participants < FEWEST_OF_MODEL:
             raise InputError(
                 f"expected {FEWEST_OF_MODEL} participants or more in [{claim.task}] for the rule "
-                f'"model" of the claim {claim.name}, got {plan.participants}; plan '
-                f'{FEWEST_OF_MODEL} or more, or write rule = "tests" in [plan] and leave few out.'
+                f'"{self.plan.rule}" of the claim {claim.name}, got {plan.participants}; plan '
+                f'{FEWEST_OF_MODEL} or more, or write rule = "tests" in [plan].'
             )
 
     def language_of_session(self, asked: str) -> str:

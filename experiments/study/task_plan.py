@@ -15,7 +15,7 @@ from tactileq.modeling.files.kinds import Label, is_different
 # The usual repeats of a task whose table does not say; 1 in any other.
 REPEATS = {"relative": 3, "oddity": 6, "threshold": 60}
 MOST_TRAINING_TRIALS = 100
-# Of a session, where the rule of verdicts is the model and the study does not say.
+# Of a session, where the rule of verdicts is not that of tests and the study does not say.
 CATCH_TRIALS = 6
 MOST_CATCH_TRIALS = 100
 
@@ -99,7 +99,7 @@ class TaskPlan(FileSection):
             int,
             key(
                 "[oddity]: main trials of a session that are catch trials; without it "
-                f'{CATCH_TRIALS} under rule = "model"',
+                f'{CATCH_TRIALS} under rule = "hierarchical"',
                 ge=0,
                 le=MOST_CATCH_TRIALS,
             ),
@@ -135,12 +135,12 @@ def with_catch_trials(plan: TaskPlan, *, rule: str, anchors: Mapping[str, str]) 
 
     Parameters
     ----------
-    rule : {"tests", "model"}
-        Of the study's verdicts; under "model" there are catch trials unless the plan says no.
+    rule : {"hierarchical", "tests", "model"}
+        Of the study's verdicts; but for "tests" there are catch trials unless the plan says no.
     anchors : mapping of texture to texture
         Of the absolute task: the pairs of a plan that names none.
     """
-    if plan.catch_trials is not None or not (plan.catch or rule == "model"):
+    if plan.catch_trials is not None or not (plan.catch or rule != "tests"):
         return plan
     return replace(plan, catch=dict(plan.catch or anchors), catch_trials=CATCH_TRIALS)
 

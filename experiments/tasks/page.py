@@ -160,10 +160,11 @@ def _rule(plan: PlanSection) -> str:
     if plan.rule == "tests":
         return "Rule of verdicts: the tests that each claim names."
     return (
-        "Rule of verdicts: the hierarchical model of the participants. Two sets of models are "
-        "equivalent where the mean effect lies inside the bounds and the share of people outside "
-        f"them is below {100 * plan.few:g} %, both at 95 %. Paired t-test and TOST are reported "
-        "beside it."
+        "Rule of verdicts: ratings are decided by the hierarchical model of the participants; two "
+        "sets of models are equivalent where the 90 % interval of the mean effect lies inside the "
+        "bounds, and different where its 95 % interval excludes 0. Paired t-test and TOST, apart "
+        "from days where models are on different ones, are reported beside it, decide about right "
+        "answers, and decide about ratings where more people began with one of the models by day."
     )
 
 
@@ -206,7 +207,7 @@ def _claimed(claim: ClaimSection) -> str:
 
 
 def _tested(plan: PlanSection, claim: ClaimSection) -> str:
-    if plan.rule == "model":
+    if plan.rule != "tests" and claim.measure in RATINGS:
         return f"Claimed: {claim.test}."
     return f"Test of {claim.test}: {TESTED[claim.test]}, corrected after Holm over the textures."
 

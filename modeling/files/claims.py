@@ -18,6 +18,7 @@ from tactileq.modeling.files.kinds import Label, is_different
 
 FEW = 0.15
 LARGEST_FEW = 0.5
+WITHDRAWN = "model"  # a rule of studies that registered it: of people outside the bounds
 RATINGS = tuple(dict.fromkeys(c.name for t in ANSWER_TABLES.values() for c in t.columns if c.scale))
 # The largest difference that there can be: in points of a scale, or between two shares.
 LARGEST = {**dict.fromkeys(RATINGS, ENDS[1] - ENDS[0]), "correct": 1.0}
@@ -94,14 +95,17 @@ class PlanSection(FileSection):
         key("share of ratings at an end of a scale above which it counts as exhausted", ge=0, le=1),
     ] = 0.2
     rule: Annotated[
-        Literal["model", "tests"],
-        key("what decides verdicts: the model of the participants, or paired t-test and TOST"),
+        Literal["hierarchical", "tests", "model"],
+        key(
+            "what decides verdicts: the hierarchical model of the participants on ratings, tests "
+            'on right answers; or paired t-test and TOST on both; "model" was withdrawn'
+        ),
     ] = "tests"
     few: Annotated[
         float,
         key(
-            "share of people outside the bounds below which models count as equivalent; beside "
-            'rule = "model" alone',
+            'of studies that registered rule = "model" alone: share of people outside the bounds '
+            "below which models counted as equivalent",
             ge=0,
             le=LARGEST_FEW,
         ),
@@ -115,21 +119,37 @@ class PlanSection(FileSection):
             raise InputError(
                 f"expected claims of different names, got {', '.join(names)}; rename one."
             )
-        if self.rule == "tests" and self.few != FEW:
-            raise _few_without_model(self.few)
+        if self.rule != WITHDRAWN and self.few != FEW:
+            raise _few_without_model(self)
 
     @classmethod
     def read(cls, values: object, *, where: str = "", folder: Path | None = None) -> Self:
         """A plan from its table; `few` is refused beside a rule that has none."""
         plan = super().read(values, where=where, folder=folder)
-        if plan.rule == "tests" and isinstance(values, Mapping) and "few" in values:
-            raise _few_without_model(plan.few)
+        if plan.rule != WITHDRAWN and isinstance(values, Mapping) and "few" in values:
+            raise _few_without_model(plan)
         return plan
 
     def to_dict(self) -> dict[str, Any]:
         """The plan as plain values, as in a study file; a rule of tests goes without saying."""
-        unsaid = ("rule", "few") if self.rule == "tests" else ()
+        unsaid = {"tests": ("rule", "few"), WITHDRAWN: ()}.get(self.rule, ("few",))
         return {name: value for name, value in super().to_dict().items() if name not in unsaid}
+
+    def require_current(self) -> None:
+        """Refuse to begin a study with a rule that was withdrawn.
+
+        Raises
+        ------
+        InputError
+            Names the rule to write.
+        """
+        if self.rule == WITHDRAWN:
+            raise InputError(
+                'expected rule = "hierarchical" or "tests" in [plan] of a new study, got "model", '
+                "which was withdrawn, since few ratings of each texture cannot tell how many "
+                'people feel a difference; write rule = "hierarchical" and remove few (sessions of '
+                "a study that was begun with it go on, and are analysed)."
+            )
 
     @property
     def sha256(self) -> str:
@@ -137,8 +157,8 @@ class PlanSection(FileSection):
         return sha256_of_values(self.to_dict())
 
 
-def _few_without_model(few: float) -> InputError:
+def _few_without_model(plan: PlanSection) -> InputError:
     return InputError(
-        f'expected few in [plan] beside rule = "model" alone, got {shown(few)} beside the rule '
-        '"tests"; write rule = "model", or remove it.'
+        f'expected few in [plan] of studies alone that registered rule = "model", got '
+        f'{shown(plan.few)} beside the rule "{plan.rule}"; remove it.'
     )

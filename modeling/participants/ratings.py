@@ -11,18 +11,10 @@ import numpy as np
 
 from tactileq.modeling.arrays import Bools, Floats
 from tactileq.modeling.files.answer_tables import ENDS
-from tactileq.modeling.participants.effects import (
-    EffectMixture,
-    EffectPriors,
-    drawn_effects,
-    drawn_mixture,
-)
 
 LOWEST, HIGHEST = ENDS
 AT_END = 0.02  # chance that a lapsed rating lies at the lower end, and at the upper one
 WITHIN = (1 - 2 * AT_END) / (HIGHEST - LOWEST)  # density of a lapsed rating between the ends
-
-_EFFECTS = EffectPriors(mean_sd=25.0, spread=1.9, weight=0.02)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,8 +25,11 @@ class RatingPriors:
 
     Parameters
     ----------
-    effects : EffectPriors
-        Of the effect of the other model.
+    mean_sd : float
+        SD of the mean effect of the other model, about 0.
+    people_sd, interaction_sd : float
+        Scales of the half-normal priors of the SD of people's effects, and of that of their
+        deviations on single textures.
     level : (float, float)
         Mean and SD of the mean level of ratings.
     person_sd, cell_sd, anchor_sd : float
@@ -56,15 +51,17 @@ class RatingPriors:
         Beta priors of the share of lapsed trials and of careless people.
     """
 
-    effects: EffectPriors = _EFFECTS
+    mean_sd: float = 25.0
+    people_sd: float = 10.0
+    interaction_sd: float = 10.0
     level: tuple[float, float] = (60.0, 20.0)
     person_sd: float = 10.0
     cell_sd: float = 5.0
     anchor_sd: float = 12.0
     texture_sd: float = 15.0
-    texture_effect_sd: float = 6.0
+    texture_effect_sd: float = 20.0
     anchor: tuple[float, float] = (-25.0, 20.0)
-    trend_sd: float = 6.0
+    trend_sd: float = 15.0
     rating_sd: float = 9.0
     rating_df: float = 10.0
     careless_scale: float = 60.0
@@ -75,16 +72,13 @@ class RatingPriors:
         """The same with every SD of a prior twice as large, and careless people twice as likely."""
         wide = replace(
             self,
-            effects=replace(
-                self.effects, mean_sd=2 * self.effects.mean_sd, spread=2 * self.effects.spread
-            ),
             level=(self.level[0], 2 * self.level[1]),
             anchor=(self.anchor[0], 2 * self.anchor[1]),
             lapses=(self.lapses[0], self.lapses[1] / 2),
             careless=(self.careless[0], self.careless[1] / 2),
         )
-        names = ("person", "cell", "anchor", "texture", "texture_effect", "trend", "rating")
-        return replace(wide, **{f"{one}_sd": 2 * getattr(self, f"{one}_sd") for one in names})
+        names = [name for name in vars(self) if name.endswith("_sd")]
+        return replace(wide, **{name: 2 * getattr(self, name) for name in names})
 
 
 def censored(latent: Floats) -> Floats:
@@ -140,16 +134,21 @@ class DrawnRatings:
 
     Parameters
     ----------
-    effects : (B, n) ndarray
-        Of each person, if they attend.
+    mean, people_sd, interaction_sd : (B,) ndarray
+        Mean effect; SDs of people's effects and of their deviations on single textures.
+    effects, texture_effects : (B, n) and (B, T) ndarray
+        Of each person, if they attend; of each texture beyond the mean effect.
     careless : (B, n) ndarray of bool
     lapses, rating_sd : (B,) ndarray
         Share of lapsed trials; typical SD of a person's ratings.
     """
 
     studies: RatingStudies
-    mixture: EffectMixture
+    mean: Floats
+    people_sd: Floats
+    interaction_sd: Floats
     effects: Floats
+    texture_effects: Floats
     careless: Bools
     lapses: Floats
     rating_sd: Floats
@@ -177,13 +176,15 @@ def drawn_ratings(
     anchors : int
         A ≥ 0.
     """
-    studies, people, textures, _, _ = trends.shape[1:]
+    studies, people, textures, _, repeats = trends.shape[1:]
     few, each = (studies, people), (studies, people, textures)
 
     def sd(typical: float) -> Floats:
         return np.asarray(np.sqrt(typical**2 / rng.standard_gamma(2.0, studies)))
 
-    mixture = drawn_mixture(priors.effects, studies, rng=rng)
+    mean = np.asarray(rng.normal(0.0, priors.mean_sd, studies), dtype=float)
+    of_people = np.abs(rng.normal(0.0, priors.people_sd, studies))
+    of_deviations = np.abs(rng.normal(0.0, priors.interaction_sd * (repeats > 1), studies))
     person = np.asarray(rng.normal(*priors.level, studies))[:, None]
     person = person + sd(priors.person_sd)[:, None] * rng.standard_normal(few)
     texture = priors.texture_sd * centred(rng.standard_normal((studies, textures)))
@@ -199,8 +200,9 @@ def drawn_ratings(
     variance = half * typical[:, None] ** 2 / rng.standard_gamma(half, few)
     rating_sd = np.where(careless, careless_sds(priors, few, rng=rng), np.sqrt(variance))
     attends = ~careless
-    effects = drawn_effects(mixture, people, rng=rng)
-    effect = effects[..., None] + own[:, None]
+    effects = mean[:, None] + of_people[:, None] * rng.standard_normal(few)
+    deviations = of_deviations[:, None, None] * rng.standard_normal(each)
+    effect = effects[..., None] + own[:, None] + deviations
     felt = person[..., None] + cell + attends[..., None] * texture[:, None]
     halves = np.array([-0.5, 0.5])
     middle = (felt[..., None] + halves * (attends[..., None] * effect)[..., None])[
@@ -215,8 +217,11 @@ def drawn_ratings(
         answered.append(np.where(lapsed, lapsed_ratings(rng, one.shape), censored(one)))
     return DrawnRatings(
         studies=RatingStudies(values=answered[0], anchors=answered[1], trends=trends),
-        mixture=mixture,
+        mean=mean,
+        people_sd=of_people,
+        interaction_sd=of_deviations,
         effects=effects,
+        texture_effects=own,
         careless=careless,
         lapses=lapses,
         rating_sd=typical,

@@ -47,10 +47,6 @@ def _section(answered: Answered, stream: Stream) -> Section:
     chance = chance_of(task, answers)
     rates = correct_rates(answers, models, rng=stream.rng, chance=chance)
     done, tile = who_took_part(responses, task)
-    overall = rates[rates["texture"] == ALL_TEXTURES].set_index("model")["mean"]
-    shown = " → ".join(f"{overall[model]:.0%}" for model in models if model in overall)
-    against = "" if np.isnan(chance) else f" (chance {chance:.0%})"
-    rate_tile = (shown, f"right answers, {' → '.join(models)}{against}")
     found = [one for one in answered.judged_in(task) if one.claim.measure == "correct"]
     section = Section(
         "choices",
@@ -61,7 +57,7 @@ def _section(answered: Answered, stream: Stream) -> Section:
         ),
         outcomes=tuple(rate_outcomes(rates, task, chance=chance)),
         done=(done,),
-        tiles=(tile, rate_tile),
+        tiles=(tile,),
     )
     return of_task(section, stream.ending)
 

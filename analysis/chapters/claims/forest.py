@@ -25,15 +25,11 @@ from tactileq.analysis.page.drawing import (
     VERMILLION,
     stamp_if_simulated,
 )
-from tactileq.analysis.statistics.caveats import BOUNDS_WITHHELD, WITHHELD
+from tactileq.analysis.statistics.caveats import BOUNDS_WITHHELD, NOT_CONVERGED, WITHHELD
 from tactileq.analysis.statistics.claims import CONTROL
 from tactileq.analysis.statistics.equivalence import (
-    ALL_BUT,
-    AVERAGE_FELT,
     DIFFERENT,
-    EQUAL_ON_AVERAGE,
     EQUIVALENT,
-    FELT,
     INCONCLUSIVE,
     WITHIN_BOUNDS,
 )
@@ -43,16 +39,13 @@ from tactileq.modeling.files.answer_tables import ANSWER_TABLES
 # Distinguished by shape as well as by colour.
 MARKS = {
     EQUIVALENT: ("o", BLUE),
-    ALL_BUT: ("h", BLUE),
-    EQUAL_ON_AVERAGE: ("<", SKY_BLUE),
-    AVERAGE_FELT: (">", ORANGE),
-    FELT: ("*", VERMILLION),
     DIFFERENT: ("D", VERMILLION),
     WITHIN_BOUNDS: ("s", ORANGE),
     INCONCLUSIVE: ("^", PURPLE),
     WITHHELD: ("v", GREEN),
     BOUNDS_WITHHELD: ("P", GREEN),
     CONTROL: ("x", GREY),
+    NOT_CONVERGED: ("<", SKY_BLUE),
     "": ("d", GREY),
 }
 NO_VERDICT = "no test"
@@ -128,8 +121,7 @@ def _plot_row(ax: Axes, row: Mapping[Hashable, Any], *, place: float, factor: fl
     for ends in INTERVALS:
         _plot_interval(ax, row, ends, place=tests_place, factor=factor, colour=tests_colour)
     edge = colour if mark == "x" else "white"
-    size = 12 if mark == "*" else 8
-    ax.plot(factor * middle, place, mark, color=colour, mec=edge, ms=size)
+    ax.plot(factor * middle, place, mark, color=colour, mec=edge, ms=8)
 
 
 def _plot_interval(
@@ -159,7 +151,7 @@ def _legend(found: Sequence[ClaimFound]) -> list[Line2D | Patch]:
         if name in occurring
     ]
     of = ""
-    if any(one.people is not None for one in found):
+    if any(one.by_model for one in found):
         of = " of the paired test"
         handles.append(Line2D([], [], color=BLACK, lw=BY_MODEL[2], label="95% CI of the model"))
     handles += [

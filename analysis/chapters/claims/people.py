@@ -10,9 +10,9 @@ from collections.abc import Sequence
 import pandas as pd
 
 from tactileq.analysis.chapters.claims.people_figure import figure_people
-from tactileq.analysis.chapters.claims.people_sentences import verdict_of_doubled
+from tactileq.analysis.chapters.claims.predictive_figure import figure_predictive
 from tactileq.analysis.page.page import Fold, Item, Picture, Table
-from tactileq.analysis.statistics.participants.verdict import PEOPLE_COLUMNS, PeopleSummary
+from tactileq.analysis.statistics.participants.verdict import PEOPLE_COLUMNS
 from tactileq.analysis.statistics.verdicts import ClaimFound, overall_row
 from tactileq.modeling.files.columns import Column, names
 from tactileq.modeling.files.writing import file_stem
@@ -24,19 +24,19 @@ PRIORS_COLUMNS = (
     Column("mean", "mean effect"),
     Column("mean_low", "95% CI from"),
     Column("mean_high", "to"),
-    Column("share", "share of people outside the bounds", format=".2f"),
-    Column("share_low", "95% CI from", format=".2f"),
-    Column("share_high", "to", format=".2f"),
-    Column("share_most", "at most (95%)", format=".2f"),
-    Column("somebody", "somebody is (probability)", format=".2f"),
+    Column("sd", "SD between people"),
+    Column("sd_low", "95% CI from"),
+    Column("sd_high", "to"),
+    Column("careless", "share of careless people", format=".2f"),
+    Column("careless_low", "95% CI from", format=".2f"),
+    Column("careless_high", "to", format=".2f"),
     Column("lapses", "lapsed trials", format=".2f"),
-    Column("r_hat", "R̂", format=".3f"),
 )
 OWN, DOUBLED = "as planned", "SDs doubled"
 
 
 def people_items(found: Sequence[ClaimFound], *, simulated: bool) -> tuple[Item, ...]:
-    """A picture for each claim that the model decides, then its tables; none without such claims.
+    """Pictures and tables of the claims that the model was asked about; none without such claims.
 
     Parameters
     ----------
@@ -46,38 +46,37 @@ def people_items(found: Sequence[ClaimFound], *, simulated: bool) -> tuple[Item,
     own = [one for one in found if one.people is not None]
     if not own:
         return ()
-    pictures = [_picture(one, simulated=simulated) for one in own]
     priors = Table(
         "people_priors",
-        "People outside the bounds, and what other priors would change",
-        "Share: of people whose own effect lies outside the bounds (who “feel it” in the words of "
-        "the answer). Below each claim: the same with the standard deviations of all priors "
-        "doubled. Effects are in points of the scale, or shares of right answers. "
-        "Where equivalence is withheld, a small share is no evidence for it.",
+        "The model of the participants, and what other priors would change",
+        "Below each claim: the same with the standard deviations of all priors doubled. Effects "
+        "are in points of the scale. Empty: not sampled well enough to be told (R̂ above 1.05, or "
+        "fewer than 400 effective draws).",
         priors_table(own),
         PRIORS_COLUMNS,
         simulated,
     )
-    return (*pictures, priors, Fold("Participants one by one", (_table(own, simulated),)))
+    pictures = [
+        picture
+        for one in own
+        for picture in (_picture(one, simulated=simulated), _predictive(one, simulated=simulated))
+    ]
+    return (Fold("People, one by one, by the model", (*pictures, _table(own, simulated))), priors)
 
 
 def priors_table(found: Sequence[ClaimFound]) -> pd.DataFrame:
     """Each claim with its priors, then with doubled ones: `PRIORS_COLUMNS`."""
     rows = []
     for one in found:
-        row = overall_row(one)
+        row, people, bounds = overall_row(one), one.people, one.claim.bounds
         assert row is not None
-        assert one.people is not None
-        doubled = verdict_of_doubled(one, share_at_ends=row["share_at_ends"])
-        own = {"claim": one.claim.name, "lapses": one.people.lapses}
-        rows.append({**own, **_row(one.people.summary, OWN, verdict=row["verdict"])})
-        own["lapses"] = float("nan")
-        rows.append({**own, **_row(one.people.doubled, DOUBLED, verdict=doubled)})
+        assert people is not None
+        assert bounds is not None
+        for priors, summary in ((OWN, people.summary), (DOUBLED, people.doubled)):
+            word = one.caveats.allowed(summary.verdict(bounds), share_at_ends=row["share_at_ends"])
+            names_of = {"claim": one.claim.name, "priors": priors, "verdict": word}
+            rows.append({**vars(summary), **names_of})
     return pd.DataFrame(rows, columns=names(PRIORS_COLUMNS))
-
-
-def _row(summary: PeopleSummary, priors: str, *, verdict: str) -> dict[str, object]:
-    return {**vars(summary), "priors": priors, "verdict": verdict}
 
 
 def people_table(found: Sequence[ClaimFound]) -> pd.DataFrame:
@@ -92,11 +91,11 @@ def _table(found: Sequence[ClaimFound], simulated: bool) -> Table:
     return Table(
         "people",
         "Participants by the model",
-        "Own effect: median and 95% interval, as the mean over textures, in points of the scale or "
-        "shares of right answers; it draws on the other participants as well, so that a single "
-        "one's deviates less than the mean of their answers. Careless participants are not left "
-        "out by hand: the model weighs everybody by the probability that they attend. The signs of "
-        "carelessness in the section on reliability are others, and are not used here.",
+        "Own effect: median and 95% interval, as the mean over textures, in points of the scale; "
+        "it draws on the other participants as well, so that a single one's deviates less than the "
+        "mean of their answers. Careless participants are not left out by hand: the model weighs "
+        "everybody by the probability that they attend. The signs of carelessness in the section "
+        "on reliability are others, and are not used here.",
         people_table(found),
         PEOPLE_COLUMNS,
         simulated,
@@ -104,13 +103,28 @@ def _table(found: Sequence[ClaimFound], simulated: bool) -> Table:
 
 
 def _picture(found: ClaimFound, *, simulated: bool) -> Picture:
+    days = " People and days are one, as the models were on different days." * found.by_day
     return Picture(
         file_stem(f"people_{found.claim.name}"),
         f"People, one by one: {found.claim.name}",
         "Each participant's own effect over all textures with its 95% interval, by the model of "
-        "the participants; grey: the bounds. Diamonds: effects that lie outside with a probability "
-        "above 0.5. Hollow squares: participants who probably did not attend; the effect that they "
-        "would have is hardly known, and they count neither in the mean nor in the share.",
+        f"the participants; grey: the bounds.{days} Hollow squares: participants who probably did "
+        "not attend; the effect that they would have is hardly known. How many lie outside the "
+        "bounds must not be read from it: few ratings of each texture cannot tell.",
         figure_people(found, simulated=simulated),
+        simulated,
+    )
+
+
+def _predictive(found: ClaimFound, *, simulated: bool) -> Picture:
+    return Picture(
+        file_stem(f"predictive_{found.claim.name}"),
+        f"Does the model describe the ratings? {found.claim.name}",
+        "Posterior predictive check: what these people rated (black) among what the model says "
+        "that they could have rated (blue). Left: share of ratings at either end of the scale. "
+        "Middle: SD of each person's ratings, in rising order, with 95% of what is predicted. "
+        "Right: SD of repeated ratings of a surface. Where black lies outside, the model misses "
+        "something that may matter.",
+        figure_predictive(found, simulated=simulated),
         simulated,
     )

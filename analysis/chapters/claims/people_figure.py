@@ -14,7 +14,6 @@ from tactileq.analysis.page.drawing import (
     BLACK,
     BLUE,
     GREY,
-    VERMILLION,
     axes_or_new,
     finish_axes,
     shared_legend,
@@ -23,9 +22,8 @@ from tactileq.analysis.page.drawing import (
 from tactileq.analysis.statistics.participants.verdict import LIKELY, PeopleFound, PeopleSummary
 from tactileq.analysis.statistics.verdicts import ClaimFound
 from tactileq.modeling.arrays import Bools
-from tactileq.modeling.files.answer_tables import ANSWER_TABLES
 
-INSIDE, OUTSIDE, CARELESS = ("o", BLUE), ("D", VERMILLION), ("s", GREY)
+ATTENDING, CARELESS = ("o", BLUE), ("s", GREY)
 MOST_TICKS = 40  # participants whose names still fit below the axis
 MOST_NAMED = 6
 LEGEND_WIDTH, TITLE_WIDTH = 58, 72  # characters
@@ -86,10 +84,8 @@ def _draw_bounds(ax: Axes, found: ClaimFound, factor: float) -> None:
 def _draw_people(ax: Axes, people: pd.DataFrame, factor: float) -> None:
     """Everybody's marker and interval."""
     careless: Bools = (people["careless"] > LIKELY).to_numpy()
-    outside: Bools = (people["outside"] > LIKELY).to_numpy() & ~careless
     kinds = (
-        (~careless & ~outside, INSIDE, "participant, 95% CI"),
-        (outside, OUTSIDE, "probably outside the bounds, 95% CI"),
+        (~careless, ATTENDING, "participant, 95% CI"),
         (careless, CARELESS, _careless_label(people[careless])),
     )
     for which, (mark, colour), label in kinds:
@@ -125,17 +121,17 @@ def _name_axes(ax: Axes, found: ClaimFound, *, people: pd.DataFrame, unit: str) 
     ax.set_xlim(-0.8, count + 1.3)
     ax.set_xlabel(f"{count} participants, sorted by their effect")
     reference, other = found.claim.models
-    if ANSWER_TABLES[found.claim.task].both_models:
-        reference, other = "chance", "share right"
     ax.set_ylabel(f"{other} − {reference}\n({unit})")
     finish_axes(ax)
 
 
 def _title(found: ClaimFound) -> str:
-    """The claim, its verdict, and the share of people outside; without a limit where in doubt."""
+    """The claim with its verdict, and the SD between people."""
     summary, overall = _people(found).summary, found.tests.iloc[0]
-    share = f"{summary.share:.0%} (95% CI {summary.share_low:.0%} to {summary.share_high:.0%})"
-    if overall["doubt"]:
-        share = f"at least {summary.share_low:.0%}, no upper limit"
     claim = fill(f"{found.claim.name}: {overall['verdict']}", TITLE_WIDTH)
-    return f"{claim}\npeople outside the bounds (grey): {share}"
+    if np.isnan(summary.sd):
+        return claim
+    what = "SD of people and days" if found.by_day else "SD between people"
+    return (
+        f"{claim}\n{what}: {summary.sd:.1f} (95% CI {summary.sd_low:.1f} to {summary.sd_high:.1f})"
+    )

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tactileq.analysis.answers.plan import EQUIVALENCE, MODEL_RULE, Claim
+from tactileq.analysis.answers.plan import EQUIVALENCE, Claim
 from tactileq.analysis.answers.responses import Responses
 from tactileq.analysis.chapters.claims.model_sentences import decided_by_tests, model_methods
-from tactileq.analysis.labels import MEASURES, TASK_TITLES
+from tactileq.analysis.labels import MEASURES, SCALES, TASK_TITLES
 from tactileq.analysis.statistics.compared_answers import chance_of
 from tactileq.analysis.statistics.described_verdicts import incomplete
 from tactileq.analysis.statistics.verdicts import ClaimFound
@@ -27,7 +27,7 @@ def deviations(responses: Responses, found: Sequence[ClaimFound]) -> list[str]:
         *(f"Planned exclusion: {sentence}" for sentence in responses.plan.exclusions),
         *_changed_plans(responses),
         *_not_planned(found),
-        *(decided_by_tests(responses, found) if responses.plan.rule == MODEL_RULE else ()),
+        *decided_by_tests(responses, found),
         *_left_out(found),
         *(f"On reading the answers: {warning}" for warning in responses.warnings),
     ]
@@ -36,13 +36,23 @@ def deviations(responses: Responses, found: Sequence[ClaimFound]) -> list[str]:
 def methods_paragraph(responses: Responses, found: Sequence[ClaimFound]) -> str:
     """The statistical methods of this report, worded for a paper."""
     claims = [one.claim for one in found]
-    sentences = [_who(responses, claims), *model_methods(responses, found)]
+    sentences = [_who(responses, claims), *model_methods(found)]
     sentences.append(
         "Each participant's answers were averaged per texture and model; a cell counts only where "
         "all planned repeats were answered. Two models were compared by paired t-tests over "
         "participants, first on the mean over the textures whose models differ, with equal weight "
         "for each texture, then for each texture with Holm's correction over the textures."
     )
+    if any(one.by_day for one in found):
+        sentences.append(
+            "Where the two models were presented on different days, the mean difference was "
+            "estimated apart from days by least squares (AB/BA crossover; Hills & Armitage, 1979)."
+        )
+    if any(one.claim.measure in SCALES for one in found):
+        sentences.append(
+            "Whether people differ was tested by the F test of participants against participant × "
+            "texture, of the differences between the two models."
+        )
     sentences += _bounds(found)
     sentences.append(
         "Effect sizes are d_z with intervals from the noncentral t distribution (Steiger & "

@@ -12,12 +12,11 @@ from tactileq.analysis.chapters.chapter import LEAD, Answered, who_took_part
 from tactileq.analysis.chapters.claims.answer import answer, unfinished_tasks
 from tactileq.analysis.chapters.claims.forest import figure_forest
 from tactileq.analysis.chapters.claims.people import people_items
-from tactileq.analysis.chapters.claims.people_sentences import FEEL_IT
 from tactileq.analysis.chapters.claims.plan_sentences import deviations, methods_paragraph
-from tactileq.analysis.chapters.claims.sentences import claim_outcomes
-from tactileq.analysis.labels import sentence_case
+from tactileq.analysis.chapters.claims.sentences import by_verdict, claim_sentences
 from tactileq.analysis.page.page import Fold, Picture, Table
 from tactileq.analysis.page.sections import Section
+from tactileq.analysis.statistics.caveats import DIFFERENCES
 from tactileq.analysis.statistics.claims import CLAIM_COLUMNS, NO_TEST, VERDICT_COLUMNS
 from tactileq.analysis.statistics.described_verdicts import (
     PLANTED_COLUMNS,
@@ -27,26 +26,46 @@ from tactileq.analysis.statistics.described_verdicts import (
 )
 from tactileq.analysis.statistics.equivalence import INCONCLUSIVE
 from tactileq.analysis.statistics.verdicts import ClaimFound, overall_row
-from tactileq.modeling.files.columns import Columns, chosen, names, without
+from tactileq.modeling.files.columns import Column, Columns, chosen, names, without
 
 TESTS_SHOWN = chosen(
     CLAIM_COLUMNS,
     *("claim", "texture", "mean_reference", "mean_other", "mean_difference", "ci_low", "ci_high"),
     *("t", "df", "p", "p_equivalence", "d_z", "d_z_low", "d_z_high", "bf01", "shapiro_p"),
-    *("wilcoxon_p", "sign_flips_p", "note", "excluded"),
+    *("wilcoxon_p", "sign_flips_p", "people_f", "people_df", "people_df_rest", "people_p"),
+    *("note", "excluded"),
 )
+IN_SHORT_COLUMNS = (
+    Column("claim", is_name=True),
+    Column("verdict", is_name=True),
+    Column("n"),
+    Column("difference"),
+    Column("ci_low", "95% CI from"),
+    Column("ci_high", "to"),
+    Column("bound_low", "allowed from"),
+    Column("bound_high", "to"),
+    Column("textures", "textures that differ"),
+    Column("people_sd", "SD between people"),
+    Column("people_p", "p that people differ", is_p_value=True),
+    Column("rule", "decided by", is_name=True),
+    Column("beside", "the other rule says", is_name=True),
+)
+IN_WORDS_COLUMNS = (Column("claim", is_name=True), Column("sentence"))
 # Of the table of verdicts.
-_OF_MODEL = ("rule", "tests_verdict", "model_mean", "model_low", "model_high", "p_of_model")
+_OF_MODEL = (
+    *("rule", "tests_verdict", "model_verdict"),
+    *("model_mean", "model_low", "model_high", "p_of_model"),
+)
 READ_AND_CHECKED = (
     "On reading: every value lies in its range; answers follow the planned order of trials, where "
     "a session's manifest is there; all are of one study and its models. What was found is listed "
     "under exclusions and deviations."
 )
 BY_MODEL = (
-    "Rule “model”: the verdict is that of the model of the participants, over all textures on the "
-    "mean effect and on the share of people outside the bounds, of single textures on the mean "
-    "alone, with Holm's correction of their posterior probabilities; that of the paired tests "
-    "stands beside it. Rule “tests”, and all other columns: "
+    "Rule “hierarchical”: the verdict is that of the model of the participants, over all textures "
+    "and on single ones on the mean effect, of single textures with Holm's correction of their "
+    "posterior probabilities; that of the paired tests stands beside it. Rule “tests”, and all "
+    "other columns: "
 )
 
 
@@ -54,15 +73,13 @@ def sections(answered: Answered) -> list[Section]:
     """The verdicts of all claims, and what they answer to the question of the report."""
     responses, found = answered.responses, answered.found
     judged = [one for one in found if not one.caveats.unfinished]
-    by_model = any(one.people is not None for one in found)
     verdicts = pd.concat([one.tests["verdict"] for one in found]) if found else pd.Series()
     section = _verdicts(answered) if answered.tested else Section("verdicts", "Verdicts", ())
     headline = answer(found, responses)
-    lead = f"{FEEL_IT} {LEAD}" if by_model else LEAD
     return [
         replace(
             section,
-            headline=headline and replace(headline, lead=lead),
+            headline=headline and replace(headline, lead=LEAD),
             verified=(READ_AND_CHECKED,),
             cautions=tuple(
                 _cautions(responses, inconclusive=bool((verdicts == INCONCLUSIVE).any()))
@@ -110,29 +127,69 @@ def _verdicts(answered: Answered) -> Section:
         TESTS_SHOWN,
         simulated,
     )
+    in_words = Table(
+        "claim_sentences",
+        "Results in words, for a paper",
+        "For each claim all textures together, then one by one.",
+        pd.DataFrame(
+            [(one.claim.name, sentence) for one in found for sentence in claim_sentences(one)],
+            columns=names(IN_WORDS_COLUMNS),
+        ),
+        IN_WORDS_COLUMNS,
+        simulated,
+    )
     return Section(
         "verdicts",
         "Verdicts",
         (
-            *people_items(judged, simulated=simulated),
+            _in_short(found, simulated=simulated),
+            in_words,
             verdicts,
             *_setups_table(judged, simulated=simulated),
             *(_planted_table(judged, planted),) * bool(planted and judged),
             Fold("Tests behind the verdicts", (detail,)),
+            *people_items(judged, simulated=simulated),
         ),
-        answer=_verdicts_in_words(judged),
-        outcomes=tuple(claim_outcomes(found)),
         front=_forest(judged, simulated=simulated),
         done=tuple(sentence for sentence, _ in so_far),
         tiles=tuple(tile for _, tile in so_far),
     )
 
 
-def _verdicts_in_words(judged: Sequence[ClaimFound]) -> str:
-    """Each claim and its verdict, without numbers; empty where none has one."""
-    rows = ((one.claim.name, overall_row(one)) for one in judged)
-    said = [f"{name}: {row['verdict'] or NO_TEST}" for name, row in rows if row is not None]
-    return sentence_case(f"{'; '.join(said)}.") if said else ""
+def _in_short(found: Sequence[ClaimFound], *, simulated: bool) -> Table:
+    """A row for each claim."""
+    rows = []
+    for one in found:
+        row = overall_row(one)
+        if row is None:
+            continue
+        by_model = one.by_model and one.people is not None
+        middle, low, high = ("model_mean", "model_low", "model_high")
+        if not by_model:
+            middle, low, high = ("mean_difference", "ci_low", "ci_high")
+        groups = by_verdict(one)
+        differ = [str(each["texture"]) for word in DIFFERENCES for each in groups.get(word, [])]
+        beside = row["tests_verdict"] if by_model else row["model_verdict"]
+        rows.append(
+            {
+                **row,
+                "difference": row[middle],
+                "ci_low": row[low],
+                "ci_high": row[high],
+                "verdict": row["verdict"] or NO_TEST,
+                "textures": ", ".join(differ),
+                "beside": beside,
+            }
+        )
+    return Table(
+        "verdicts",
+        "Each claim in a row",
+        "Difference: other − reference, over the textures whose models differ, in points of the "
+        "scale or shares of right answers, by what decides. Everything else is in the supplement.",
+        pd.DataFrame(rows, columns=names(IN_SHORT_COLUMNS)),
+        IN_SHORT_COLUMNS,
+        simulated,
+    )
 
 
 def _verdicts_shown(*, by_model: bool) -> Columns:
@@ -183,8 +240,8 @@ def _planted_table(
         "planted_effects",
         "Verdicts compared with the planted differences",
         "Planted: by how many points simulated participants rate the other model higher; the "
-        "verdict is based on their answers. Undecided: inconclusive, felt by some, or a "
-        "verdict that was withheld.",
+        "verdict is based on their answers. Undecided: inconclusive, or a verdict that was "
+        "withheld.",
         planted_verdicts(found, planted or {}),
         PLANTED_COLUMNS,
         simulated=True,

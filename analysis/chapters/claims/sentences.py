@@ -1,4 +1,4 @@
-"""What the tests of claims say, in sentences."""
+"""What a verdict says in sentences: the one for the first page, and the tests behind it."""
 
 from __future__ import annotations
 
@@ -6,12 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from tactileq.analysis.chapters.claims.people_sentences import (
-    chains_disagree,
-    disagreement,
-    doubled_priors,
-    texture_effect,
-)
+from tactileq.analysis.chapters.claims.people_sentences import disagreement, do_people_differ
 from tactileq.analysis.labels import (
     ALL_TEXTURES,
     IDENTICAL,
@@ -20,51 +15,166 @@ from tactileq.analysis.labels import (
     signed,
     unit_of,
 )
-from tactileq.analysis.page.outcomes import Outcome, Weight
-from tactileq.analysis.statistics.caveats import DIFFERENCES, INTERIM, WITHOUT_EQUALITY
+from tactileq.analysis.statistics.caveats import (
+    BOUNDS_WITHHELD,
+    DIFFERENCES,
+    INTERIM,
+    NOT_CONVERGED,
+    WITHHELD,
+    WITHOUT_EQUALITY,
+)
 from tactileq.analysis.statistics.claims import CONTROL, NO_TEST, all_equivalent
+from tactileq.analysis.statistics.equivalence import (
+    DIFFERENT,
+    EQUIVALENT,
+    INCONCLUSIVE,
+    WITHIN_BOUNDS,
+)
 from tactileq.analysis.statistics.verdicts import ClaimFound, Row, overall_row
 from tactileq.modeling.files.answer_tables import ANSWER_TABLES
 from tactileq.modeling.files.columns import p_value
 
-_JOINTLY = "all textures jointly equivalent (largest p of TOST below .05)"
-_JOINTLY_BY_MODEL = (
-    "all textures jointly equal on average (largest probability of a mean beyond a bound below .05)"
-)
+MOST_NAMED = 3  # textures that show no difference, beyond which they are counted
+SAID = {
+    EQUIVALENT: "equivalent",
+    WITHIN_BOUNDS: "different, but by no more than allowed",
+    DIFFERENT: "a difference is shown; whether it is too large is open",
+    INCONCLUSIVE: "inconclusive: neither a difference nor equivalence is shown",
+    WITHHELD: "not called equivalent, since {doubt}",
+    BOUNDS_WITHHELD: "a difference is shown; nothing is concluded about the bounds, since {doubt}",
+    INTERIM: "no verdict before the study is complete",
+    NO_TEST: "not tested{because}",
+    NOT_CONVERGED: "no verdict, since the sampler did not converge; analyse again with other draws "
+    "(--seed)",
+}
+TOO_LARGE = "a difference is shown, larger than allowed"
+NOT_DIFFERENT = "no difference is shown, and without bounds equivalence cannot be tested"
+_JOINTLY = "all textures jointly equivalent (largest p of equivalence below .05)"
 
 
-def claim_outcomes(found: Sequence[ClaimFound]) -> list[Outcome]:
-    """For each claim a sentence on all textures together, and one on each of them.
+def claim_in_short(found: ClaimFound, row: Row, *, what: str, where: str = "") -> str:
+    """What the first page says of a claim: difference, verdict, textures, people, priors.
+
+    Parameters
+    ----------
+    row : Row
+        Over all textures.
+    what : str
+        The measure, in words.
+    where : str
+        Over which textures, if claims differ in it.
+    """
+    verdict = row["verdict"] or NO_TEST
+    said = SAID[verdict]
+    if verdict == DIFFERENT and _beyond(found, row):
+        said = TOO_LARGE
+    elif found.claim.bounds is None and verdict in (DIFFERENT, INCONCLUSIVE):
+        said = NOT_DIFFERENT if verdict == INCONCLUSIVE else "a difference is shown"
+    because = f": {row['note']}" if row["note"] else ", because answers are incomplete"
+    said = said.format(doubt=row["doubt"], because=because)
+    if verdict in (INTERIM, NO_TEST, NOT_CONVERGED):
+        return f"{sentence_case(what)}{where}: {said}."
+    parts = [f"{sentence_case(what)}{where}: {_difference(found, row)}: {said}."]
+    parts += [_which_textures(found, row), do_people_differ(found, row), _if_doubled(found, row)]
+    return " ".join(part for part in parts if part)
+
+
+def _beyond(found: ClaimFound, row: Row) -> bool:
+    """Whether the whole 95 % interval lies beyond a bound."""
+    if found.claim.bounds is None:
+        return False
+    _, low, high = _interval(found, row, level="95%")
+    return bool(low > found.claim.bounds[1] or high < found.claim.bounds[0])
+
+
+def _interval(found: ClaimFound, row: Row, *, level: str) -> tuple[float, float, float]:
+    """The mean difference and the interval of what decides."""
+    if found.by_model and found.people is not None:
+        own = found.people.summary
+        if level == "90%":
+            return own.mean, own.mean90_low, own.mean90_high
+        return own.mean, own.mean_low, own.mean_high
+    low, high = ("ci90_low", "ci90_high") if level == "90%" else ("ci_low", "ci_high")
+    return row["mean_difference"], row[low], row[high]
+
+
+def _difference(found: ClaimFound, row: Row) -> str:
+    """`5.8 points of 100 lower with simplified models (95% CI −9.4 to −2.5; allowed ±7.5)`.
+
+    The interval is the one that the verdict rests on: 90 % where it says or withholds equivalence.
+    """
+    level = "90%" if row["verdict"] in (EQUIVALENT, WITHHELD) else "95%"
+    unit, factor = unit_of(found.claim.measure)
+    mean, low, high = (factor * value for value in _interval(found, row, level=level))
+    interval = f"{level} CI {signed(low, 1)} to {signed(high, 1)}"
+    if np.isnan(low):
+        interval = "no interval, since participants do not vary"
+    if found.claim.bounds is not None:
+        interval += f"; allowed {_allowed(found.claim.bounds, factor)}"
+    if ANSWER_TABLES[found.claim.task].both_models:
+        than = f"above chance, {found.claim.models[1]} among {found.claim.models[0]} models"
+        return f"{signed(mean, 1)} {unit} {than} ({interval})"
+    direction = "higher" if mean > 0 else "lower"
+    return f"{abs(mean):.1f} {unit} {direction} with {found.claim.models[1]} models ({interval})"
+
+
+def _allowed(bounds: tuple[float, float], factor: float) -> str:
+    low, high = bounds
+    if np.isclose(-low, high):
+        return f"±{factor * high:.3g}"
+    return f"{signed(factor * low, 1)} to {signed(factor * high, 1)}"
+
+
+def _which_textures(found: ClaimFound, row: Row) -> str:
+    """Which single textures a difference comes from, and what the others show."""
+    groups = by_verdict(found)
+    differ = [one for verdict in DIFFERENCES for one in groups.get(verdict, [])]
+    count = sum(map(len, groups.values()))
+    if not differ:
+        alone = row["verdict"] in DIFFERENCES and count > 1
+        return "No single texture shows it." * alone
+    others = [str(one["texture"]) for name, rows in groups.items() for one in rows]
+    names = [str(one["texture"]) for one in differ]
+    others = [name for name in others if name not in names]
+    _, factor = unit_of(found.claim.measure)
+    shown = ", ".join(
+        f"{one['texture']} ({signed(factor * _mean_of(found, one), 1)})" for one in differ
+    )
+    verb = "It comes from" if row["verdict"] in DIFFERENCES else "Single textures that differ:"
+    if not others:
+        return f"{verb} {shown}."
+    rest = ", ".join(others) if len(others) <= MOST_NAMED else f"the other {len(others)}"
+    return f"{verb} {shown}; {rest} {'shows' if len(others) == 1 else 'show'} none."
+
+
+def _mean_of(found: ClaimFound, row: Row) -> float:
+    return float(row["model_mean"] if found.by_model else row["mean_difference"])
+
+
+def _if_doubled(found: ClaimFound, row: Row) -> str:
+    """That wider priors would turn the verdict; empty where they would not."""
+    if not found.by_model or found.people is None or found.claim.bounds is None:
+        return ""
+    word = found.people.doubled.verdict(found.claim.bounds)
+    word = found.caveats.allowed(word, share_at_ends=row["share_at_ends"])
+    if word == row["verdict"]:
+        return ""
+    return f"With priors twice as wide the verdict would be “{word}”."
+
+
+def claim_sentences(found: ClaimFound) -> list[str]:
+    """For a paper: a sentence on all textures together, and one on each of them.
 
     An unfinished task gets a single sentence, without an effect. Where the model of the
-    participants decides, there are more: that the tests say something else, that its chains
-    disagree, and what other priors would change.
+    participants says something else than the tests, there is a third.
     """
-    outcomes = []
-    for one in found:
-        row = overall_row(one)
-        if row is not None:
-            outcomes.append(Outcome(Weight.OVERALL, _overall(one, row)))
-            outcomes += _beside(one, row)
-        if one.caveats.unfinished:
-            continue
-        textures = by_verdict(one)
-        differ = set(DIFFERENCES) & textures.keys()
-        weight = Weight.TEXTURES if differ else Weight.SECONDARY
-        outcomes.append(Outcome(weight, _textures(one, textures)))
-    return outcomes
-
-
-def _beside(found: ClaimFound, row: Row) -> list[Outcome]:
-    """What is said of a verdict of the model besides itself."""
-    if found.people is None:
-        return []
-    said = [
-        (Weight.OVERALL, chains_disagree(found)),
-        (Weight.OVERALL, disagreement(found, row)),
-        (Weight.SECONDARY, doubled_priors(found, row)),
-    ]
-    return [Outcome(weight, sentence) for weight, sentence in said if sentence]
+    row = overall_row(found)
+    sentences = [_overall(found, row)] if row is not None else []
+    if found.caveats.unfinished:
+        return sentences
+    sentences.append(_textures(found, by_verdict(found)))
+    apart = disagreement(found, row) if row is not None else ""
+    return sentences + [apart] * bool(apart)
 
 
 def by_verdict(found: ClaimFound) -> dict[str, list[Row]]:
@@ -77,7 +187,7 @@ def by_verdict(found: ClaimFound) -> dict[str, list[Row]]:
 
 
 def difference(found: ClaimFound, row: Row, *, confidence: str = "95%") -> str:
-    """The mean difference with its interval: `−1.7 points of 100 (95% CI −2.9 to −0.5)`."""
+    """The mean difference by the tests: `−1.7 points of 100 (95% CI −2.9 to −0.5)`."""
     unit, factor = unit_of(found.claim.measure)
     ends = ("ci90_low", "ci90_high") if confidence == "90%" else ("ci_low", "ci_high")
     middle, low, high = (factor * row[name] for name in ("mean_difference", *ends))
@@ -107,8 +217,9 @@ def _overall(found: ClaimFound, row: Row) -> str:
     if verdict in WITHOUT_EQUALITY:
         text += f", since {row['doubt']}"
     if verdict != INTERIM:
-        tests = f"{difference(found, row, confidence='90%')}{_tests(row)}"
-        if found.people is not None:
+        days = ", apart from days" * found.by_day
+        tests = f"{difference(found, row, confidence='90%')}{days}{_tests(row)}"
+        if found.by_model:
             shown = row["tests_verdict"] or NO_TEST
             tests = f"paired tests: {shown}, {tests}"
         text += f"; {tests}"
@@ -126,7 +237,7 @@ def _tests(row: Row) -> str:
         text += f", TOST {_p(row['p_equivalence'])}"
     if np.isfinite(row["d_z"]):
         text += f", d_z = {signed(row['d_z'], 2)}"
-        if not row["doubt"]:
+        if not row["doubt"] and np.isfinite(row["bf01"]):
             text += f", BF₀₁ = {row['bf01']:.2g} (maximum at this n: {row['bf01_highest']:.2g})"
     return text
 
@@ -142,7 +253,7 @@ def _textures(found: ClaimFound, groups: Mapping[str, Sequence[Row]]) -> str:
         apart = "; " if verdict in (*DIFFERENCES, *WITHOUT_EQUALITY) else ", "
         parts.append(f"{verdict}: {apart.join(shown)}")
     if found.claim.bounds is not None and all_equivalent(found.tests):
-        parts.append(_JOINTLY if found.people is None else _JOINTLY_BY_MODEL)
+        parts.append(_JOINTLY)
     same = found.tests[found.tests["note"] == IDENTICAL]["texture"]
     if len(same):
         parts.append(f"{IDENTICAL}: {', '.join(same)}")
@@ -152,8 +263,11 @@ def _textures(found: ClaimFound, groups: Mapping[str, Sequence[Row]]) -> str:
 
 def _texture_difference(found: ClaimFound, row: Row) -> str:
     """How a texture differs, by what decides about it."""
-    if found.people is not None:
-        return texture_effect(found, row)
+    if found.by_model:
+        unit, factor = unit_of(found.claim.measure)
+        values = (factor * row[name] for name in ("model_mean", "model_low", "model_high"))
+        middle, low, high = (signed(value, 1) for value in values)
+        return f"{middle} {unit} (95% CI {low} to {high})"
     return f"{difference(found, row)}, Holm {_p(row['p_holm'])}"
 
 

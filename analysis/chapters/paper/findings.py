@@ -16,7 +16,7 @@ from scipy import stats
 
 from tactileq.analysis.labels import MODELS, unit_of
 from tactileq.analysis.statistics.compared_answers import chance_of
-from tactileq.analysis.statistics.equivalence import EQUAL_ON_AVERAGE, EQUIVALENT
+from tactileq.analysis.statistics.equivalence import EQUIVALENT
 from tactileq.analysis.statistics.paired import mean, t_interval
 from tactileq.analysis.statistics.verdicts import ClaimFound
 from tactileq.modeling.arrays import Floats
@@ -185,10 +185,8 @@ def _differences(found: ClaimFound) -> Iterator[PaperFinding]:
         if texture not in PAPER_TEXTURES:
             continue
         low, high = factor * row["ci_low"], factor * row["ci_high"]
-        equal = {row["verdict"], row["tests_verdict"]} & {EQUIVALENT, EQUAL_ON_AVERAGE}
-        outcome = _outcome(
-            low, high, at=0.0, sign=named.get(texture), equal=bool(equal) and not row["doubt"]
-        )
+        equal = EQUIVALENT in (row["verdict"], row["tests_verdict"]) and not row["doubt"]
+        outcome = _outcome(low, high, at=0.0, sign=named.get(texture), equal=equal)
         if texture in found.caveats.identical:
             outcome = NOT_COMPARABLE
         own = found.values[found.values["texture"] == texture]

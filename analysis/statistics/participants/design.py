@@ -12,7 +12,6 @@ import numpy as np
 import pandas as pd
 
 from tactileq.modeling.arrays import Floats, Integers
-from tactileq.modeling.participants.choices import ChoiceStudies, DecisionModel
 from tactileq.modeling.participants.ratings import RatingStudies
 
 
@@ -28,12 +27,15 @@ class PeopleData:
         Of choices.
     people, textures : sequence of str
         In the order of the arrays.
+    decides : bool
+        Whether the verdicts are the model's: not under a plan that says otherwise, nor where models
+        were on different days and more people began with one of them.
     """
 
-    studies: RatingStudies | ChoiceStudies
-    model: DecisionModel | None
+    studies: RatingStudies
     people: Sequence[str]
     textures: Sequence[str]
+    decides: bool = True
 
 
 def rating_studies(
@@ -67,65 +69,26 @@ def rating_studies(
     return RatingStudies(values=values, anchors=_anchors(checks, column, people), trends=trends)
 
 
-def choice_studies(
-    answers: pd.DataFrame,
-    checks: pd.DataFrame,
-    *,
-    models: Sequence[str],
-    people: Sequence[str],
-) -> ChoiceStudies:
-    """One study of right answers, as `rating_studies`; one model where trials hold both.
-
-    Parameters
-    ----------
-    answers, checks : DataFrame
-        With correct (0 or 1); `checks` are catch trials.
-    """
-    known = answers[answers["correct"].notna()]
-    cells, places = _cells(known, models, people)
-    right, asked = np.zeros(places), np.zeros(places)
-    right[cells] = known["correct"]
-    asked[cells] = 1.0
-    trends = np.zeros((2, *places))
-    for trend, one in zip(trends, _trends(known), strict=True):
-        trend[cells] = one
-    count = asked.sum(axis=-1)
-    caught = checks[checks["correct"].notna()] if len(checks) else checks
-    of_people = [caught[caught["participant_id"] == who] for who in people]
-    return ChoiceStudies(
-        right=right.sum(axis=-1)[None],
-        asked=count[None],
-        catch_right=np.array([[one["correct"].sum() if len(one) else 0.0 for one in of_people]]),
-        catch_asked=np.array([[float(len(one)) for one in of_people]]),
-        trends=(trends.sum(axis=-1) / np.maximum(count, 1))[:, None],
-    )
-
-
 def axis_of_studies(name: str) -> int:
-    """The axis of the studies in the arrays of this name, of `RatingStudies` or `ChoiceStudies`."""
+    """The axis of the studies in the array of `RatingStudies` of this name."""
     return 1 if name == "trends" else 0
 
 
-def first_people(
-    studies: RatingStudies | ChoiceStudies, sizes: Sequence[int]
-) -> RatingStudies | ChoiceStudies:
+def first_people(studies: RatingStudies, sizes: Sequence[int]) -> RatingStudies:
     """Studies of the first people of one study alone, one for each size."""
     changed = {}
     for name, values in vars(studies).items():
         tiled = np.repeat(values, len(sizes), axis=axis_of_studies(name))
         if name != "trends":
-            nothing = np.nan if isinstance(studies, RatingStudies) else 0.0
             for one, size in zip(tiled, sizes, strict=True):
-                one[size:] = nothing
+                one[size:] = np.nan
         changed[name] = tiled
-    return type(studies)(**changed)
+    return RatingStudies(**changed)
 
 
-def side_by_side(
-    studies: Sequence[RatingStudies | ChoiceStudies],
-) -> RatingStudies | ChoiceStudies:
-    """Studies of one kind and shape as those of one object, in their order."""
-    return type(studies[0])(
+def side_by_side(studies: Sequence[RatingStudies]) -> RatingStudies:
+    """Studies of one shape as those of one object, in their order."""
+    return RatingStudies(
         **{
             name: np.concatenate(
                 [getattr(one, name) for one in studies], axis=axis_of_studies(name)

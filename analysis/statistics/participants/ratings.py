@@ -8,9 +8,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import gammaln, ndtr, ndtri
 
-from tactileq.analysis.statistics.participants.mixture import MixtureOfEffects, vague_mean
+from tactileq.analysis.statistics.participants.population import GridSd, NormalPopulation
 from tactileq.modeling.arrays import Bools, Floats
-from tactileq.modeling.participants.effects import EffectMixture
 from tactileq.modeling.participants.ratings import (
     AT_END,
     HIGHEST,
@@ -18,12 +17,12 @@ from tactileq.modeling.participants.ratings import (
     WITHIN,
     RatingPriors,
     RatingStudies,
+    censored,
+    lapsed_ratings,
 )
 
 _NORMAL = 1 / np.sqrt(2 * np.pi)
 _HALVES = np.array([-0.5, 0.5])[:, None]
-_UNKNOWN = 1e8  # variance of an effect that no answer tells about
-_WIDEST = 2.0  # SD of people that the mean effect allows for, in SDs of the components' means
 _TINY = 1e-300
 
 
@@ -31,6 +30,13 @@ def _summed(values: Floats, *, keep: int) -> Floats:
     """Sums over all axes but the first few; a product is much faster than short sums."""
     flat = values.reshape(*values.shape[:keep], -1)
     found: Floats = flat @ np.ones(flat.shape[-1])
+    return found
+
+
+def _other_less_reference(left: Floats) -> Floats:
+    """(B, n, T) half of the sum over the other model's repeats less that of the reference's."""
+    sums = _summed(left, keep=4)
+    found: Floats = 0.5 * (sums[..., 1] - sums[..., 0])
     return found
 
 
@@ -54,16 +60,19 @@ class RatingSampler:
         b, n, t, _, _ = studies.values.shape
         # Who is there at all; the others follow the priors and change nothing.
         self.people: Bools = self._main.of_people + self._anchors.of_people > 0
-        self._mixture = MixtureOfEffects(priors.effects, b, rng=rng)
+        self.population = NormalPopulation(priors.mean_sd, priors.people_sd, b, rng=rng)
+        self._interaction = GridSd(priors.interaction_sd, b, rng=rng)
+        # Of a single rating nothing tells it from the scatter of a person's ratings.
+        twice = self._main.counts.sum(axis=-1) > 1
+        self._interaction.hold(~twice.any(axis=(1, 2, 3)))
         self._level = np.full(b, priors.level[0])
         self._person = self._main.means(self._level)
         self._person_variance = np.full(b, priors.person_sd**2)
         self._cell, self._cell_variance = np.zeros((b, n, t)), np.full(b, priors.cell_sd**2)
         self._texture, self.texture_effects = np.zeros((b, t)), np.zeros((b, t))
-        self.effects = np.zeros((b, n))
+        self.effects, self._deviations = np.zeros((b, n)), np.zeros((b, n, t))
         self._slopes = np.zeros((len(studies.trends), b))
         self._rest = np.zeros_like(studies.values)
-        self.estimates = np.zeros((b, n)), np.ones((b, n))
         anchors = studies.anchors.shape[2]
         self._anchor, self._own_anchor = (
             np.full((b, anchors), priors.anchor[0]),
@@ -74,32 +83,27 @@ class RatingSampler:
         self._typical = np.full(b, priors.rating_sd**2)
         self.attends = np.ones((b, n), dtype=bool)
         self.lapses = np.full(b, 0.05)
-        self._careless_share = np.full(b, 0.05)
+        self.careless = np.full(b, 0.05)
 
     @property
-    def mixture(self) -> EffectMixture:
-        """The distribution of people's effects as it is now."""
-        return self._mixture.mixture
+    def interaction_sd(self) -> Floats:
+        """(B,) SD of the deviations of people's effects on single textures."""
+        return self._interaction.now
 
     @property
     def typical_sd(self) -> Floats:
         """(B,) typical SD of a person's ratings."""
         return np.asarray(np.sqrt(self._typical))
 
-    def settle(self) -> None:
-        """Nothing in these steps is adapted."""
-
-    def person_effects(self) -> Floats:
-        """(B, n) effect of each participant over all textures, in points."""
-        return self.effects
-
-    def mean_effects(self) -> tuple[Floats, Floats]:
-        """Mean effect (B,) of people who attend, and on each texture (B, T), in points."""
-        who = self.attends & self.people
-        mean = vague_mean(
-            *self.estimates, who, widest=_WIDEST * self._priors.effects.mean_sd, rng=self._rng
-        )
-        return mean, mean[:, None] + self.texture_effects
+    def replicated(self) -> Floats:
+        """(B, n, T, 2, R) ratings as the same people could give them; NaN where none was given."""
+        expected = self._own() + self.attends[..., None, None, None] * self._felt()
+        sd = np.sqrt(self._variance)[..., None, None, None]
+        shape, lapses = self._rest.shape, self.lapses[:, None, None, None, None]
+        rated = censored(expected + sd * self._rng.standard_normal(shape))
+        lapsed = self._rng.random(shape) < lapses
+        rated = np.where(lapsed, lapsed_ratings(self._rng, shape), rated)
+        return np.where(self._main.answered, rated, np.nan)
 
     def step(self) -> None:
         """Draw every unknown once, given all others."""
@@ -123,16 +127,27 @@ class RatingSampler:
         )
         return found
 
+    def _own(self) -> Floats:
+        """(B, n, T, 2, R): what people rate whether they attend or not."""
+        found: Floats = (self._person[..., None] + self._cell)[..., None, None] + self._trend()
+        return found
+
+    def _on_textures(self) -> Floats:
+        """(B, n, T): effect of each person on each texture."""
+        found: Floats = self.effects[..., None] + self.texture_effects[:, None] + self._deviations
+        return found
+
     def _felt(self) -> Floats:
         """(B, n, T, 2, 1): what people who attend add to their own levels."""
-        effects = self.effects[..., None] + self.texture_effects[:, None]
+        effects = self._on_textures()
         felt: Floats = self._texture[:, None, :, None, None] + _HALVES * effects[..., None, None]
         return felt
 
     def _draw_classes(self) -> None:
         """Who attends, which trials lapsed, and the latent judgements beyond the ends."""
-        own = (self._person[..., None] + self._cell)[..., None, None] + self._trend()
+        own = self._own()
         sd = np.sqrt(self._variance)[..., None, None, None]
+        proposed = self._propose_effects(own)
         felt = self._felt()
         attending = self._main.likelihoods(own + felt, sd)
         careless = self._main.likelihoods(own, sd)
@@ -145,7 +160,7 @@ class RatingSampler:
             self._anchors.likelihoods(level, sd_own),
         )
         lapses = self.lapses[:, None, None]
-        log = np.log(1 - self._careless_share)[:, None] - np.log(self._careless_share)[:, None]
+        log = (np.log1p(-self.careless) - np.log(self.careless))[:, None] - proposed
         log = log + self._main.log_ratio(attending, careless, self.lapses)
         log += self._anchors.log_ratio(*anchors, self.lapses) + self._log_prior_ratio()
         self.attends = self._rng.random(log.shape) < 1 / (1 + np.exp(-np.clip(log, -500, 500)))
@@ -160,6 +175,41 @@ class RatingSampler:
         middle = np.where(shown, expected, level)
         self._anchors.draw_latent(middle, np.where(shown, sd_anchor, sd_own), self._rng)
 
+    def _propose_effects(self, own: Floats) -> Floats:
+        """What careless people's effects would be, did they attend; (B, n) log density to prior.
+
+        Pseudo-priors of Carlin and Chib (1995): effects of people who do not attend are in no
+        likelihood, and drawn from the prior they would hardly ever fit the answers, so that whoever
+        is careless in one step stayed so. They are drawn as if these people attended, and the
+        ratio of that density to the prior's is taken back where classes are drawn.
+        """
+        precision = 0.25 * self._main.given_count / self._variance[..., None]
+        left = self._main.answered * (
+            self._main.given - own - self._texture[:, None, :, None, None]
+        )
+        total = _other_less_reference(left) / self._variance[..., None]
+        variance, textures = (
+            self._interaction.now[:, None, None] ** 2,
+            self.texture_effects[:, None],
+        )
+        grown = 1 + precision * variance
+        prior, mean = self.population.sd[:, None] ** -2, self.population.mean[:, None]
+        known = (precision / grown).sum(axis=2) + prior
+        middle = ((total - precision * textures) / grown).sum(axis=2) + mean * prior
+        middle /= known
+        self.effects = np.where(self.attends, self.effects, self._normal(middle, known))
+        rest = total - precision * (self.effects[..., None] + textures)
+        middles = variance * rest / grown
+        drawn = self._normal(middles, grown / variance)
+        own_deviations = self._deviations = np.where(
+            self.attends[..., None], self._deviations, drawn
+        )
+        away = own_deviations**2 - grown * (own_deviations - middles) ** 2
+        log = (away / variance + np.log(grown)).sum(axis=2) + np.log(known / prior)
+        log += prior * (self.effects - mean) ** 2 - known * (self.effects - middle) ** 2
+        found: Floats = 0.5 * log
+        return found
+
     def _log_prior_ratio(self) -> Floats:
         """Log density of each person's variance if they attend, over that if they do not."""
         half, scale = self._priors.rating_df / 2, self._priors.careless_scale
@@ -170,19 +220,35 @@ class RatingSampler:
         return found
 
     def _draw_effects(self) -> None:
-        counts = self._main.counts
-        precision = 0.25 * self._main.of_people / self._variance
-        left = _summed(counts * self._rest, keep=4)
-        total = _summed(left * _HALVES[:, 0], keep=2) / self._variance + precision * self.effects
-        known = precision > 0
-        safe = np.where(known, precision, 1 / _UNKNOWN)
-        self.estimates = np.where(known, total / safe, 0.0), 1 / safe
-        old, who = self.effects, self.attends & self.people
-        self.effects = self._mixture.draw(*self.estimates, who)
-        self._apart(self.attends[..., None] * (self.effects - old)[..., None])
+        """Effects of people, of textures and of people on textures, with the SDs of the people.
+
+        The deviations are integrated out of everything but themselves.
+        """
+        share = (self.attends / self._variance)[..., None]
+        precision = 0.25 * _summed(self._main.counts, keep=3) * share
+        old = self._on_textures()
+        total = _other_less_reference(self._main.counts * self._rest) * share + precision * old
+        variance = self._interaction.window()[:, None, None] ** 2
+        rest = (total - precision * (old - self._deviations))[..., None]
+        grown = 1 + precision[..., None] * variance
+        log = rest**2 * variance / grown - np.log(grown)
+        self._interaction.choose(0.5 * log.sum(axis=(1, 2)))
+        variance = self._interaction.now[:, None, None] ** 2
+        grown = 1 + precision * variance
+        weights, sums = precision / grown, total / grown
+        of_people = sums - weights * self.texture_effects[:, None]
+        self.effects = self.population.draw(of_people.sum(axis=2), weights.sum(axis=2))
+        of_textures = sums - weights * self.effects[..., None]
+        self.texture_effects = self._without_mean(
+            of_textures.sum(axis=1), weights.sum(axis=1), self._priors.texture_effect_sd
+        )
+        means = self.effects[..., None] + self.texture_effects[:, None]
+        rest = total - precision * means
+        self._deviations = self._normal(variance * rest / grown, grown / variance)
+        self._apart(self.attends[..., None] * (self._on_textures() - old))
 
     def _apart(self, change: Floats) -> None:
-        """Take changed effects (B, n, T or 1) of the other model from what is left."""
+        """Take changed effects (B, n, T) of the other model from what is left."""
         change = 0.5 * change[..., None]
         self._rest[:, :, :, 0] += change
         self._rest[:, :, :, 1] -= change
@@ -221,25 +287,15 @@ class RatingSampler:
         self._cell_variance = self._inverse_gamma(self._priors.cell_sd, count, squares)
 
     def _draw_textures(self) -> None:
-        """Levels and effects of the textures, each without a mean over them."""
-        counts = self._main.counts
+        """Levels of the textures, without a mean over them."""
         share = (self.attends / self._variance)[..., None]
-        by_model = _summed(counts, keep=4) * share[..., None]
-        left = _summed(counts * self._rest, keep=4) * share[..., None]
-        precision, total = by_model.sum(axis=(1, 3)), left.sum(axis=(1, 3))
+        precision = (_summed(self._main.counts, keep=3) * share).sum(axis=1)
+        total = (_summed(self._main.counts * self._rest, keep=3) * share).sum(axis=1)
         old = self._texture
         total += precision * old
         self._texture = self._without_mean(total, precision, self._priors.texture_sd)
         change = (self._texture - old)[:, None]
         self._rest -= (self.attends[..., None] * change)[..., None, None]
-        left -= by_model * change[..., None]
-        total = 0.5 * (left[..., 1] - left[..., 0]).sum(axis=1)
-        old = self.texture_effects
-        total += 0.25 * precision * old
-        self.texture_effects = self._without_mean(
-            total, 0.25 * precision, self._priors.texture_effect_sd
-        )
-        self._apart(self.attends[..., None] * (self.texture_effects - old)[:, None])
 
     def _without_mean(self, total: Floats, precision: Floats, sd: float) -> Floats:
         """Normal draws (B, T) under the condition that their sum is 0.
@@ -309,7 +365,7 @@ class RatingSampler:
         careless = (self.people & ~self.attends).sum(axis=1)
         attending = (self.people & self.attends).sum(axis=1)
         shares = self._beta(self._priors.careless, careless, attending)
-        self._careless_share = np.clip(shares, 1e-9, 1 - 1e-9)
+        self.careless = np.clip(shares, 1e-9, 1 - 1e-9)
 
     def _normal(self, middle: Floats, precision: Floats) -> Floats:
         found: Floats = middle + self._rng.standard_normal(middle.shape) / np.sqrt(precision)
@@ -338,8 +394,9 @@ class _Answers:
         self.latent = np.where(self.answered, values, 0.0)
         self.counts = self.answered.astype(float)
         self.of_people = _summed(self.counts, keep=2)
-        self._values = self.latent.copy()
+        self.given = self.latent.copy()
         self._known = self.counts.copy()
+        self.given_count = _summed(self.counts, keep=3)
         low = self.answered & (values <= LOWEST)
         high = self.answered & (values >= HIGHEST)
         self._low, self._high = np.nonzero(low), np.nonzero(high)
@@ -354,7 +411,7 @@ class _Answers:
 
     def likelihoods(self, middle: Floats, sd: Floats) -> Floats:
         """Density of each rating by a normal judgement, probability of one at an end."""
-        scaled = (self._values - middle) / sd
+        scaled = (self.given - middle) / sd
         found: Floats = np.exp(-0.5 * scaled * scaled) * (_NORMAL / sd)
         for places, low in ((self._low, True), (self._high, False)):
             if places[0].size:
@@ -378,7 +435,7 @@ class _Answers:
 
     def draw_latent(self, middle: Floats, sd: Floats, rng: np.random.Generator) -> None:
         """Judgements beyond an end of the scale, where a rating lies at it."""
-        shape = self._values.shape
+        shape = self.given.shape
         for places, end in ((self._low, LOWEST), (self._high, HIGHEST)):
             if places[0].size:
                 sign = 1.0 if end == LOWEST else -1.0

@@ -1,46 +1,38 @@
-"""The verdict of the model of the participants on a claim, and what it rests on.
+"""The verdict of the model of the participants on a claim about ratings, and what it rests on.
 
 docs/method/participants.md#verdict
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from scipy.special import ndtr
 
 from tactileq.analysis.columns import TEXTURE
-from tactileq.analysis.statistics.equivalence import (
-    ALL_BUT,
-    ALPHA,
-    AVERAGE_FELT,
-    DIFFERENT,
-    EQUIVALENT,
-    FELT,
-    INCONCLUSIVE,
-    Bounds,
-)
+from tactileq.analysis.statistics.caveats import NOT_CONVERGED
+from tactileq.analysis.statistics.equivalence import ALPHA, Bounds, combined
 from tactileq.analysis.statistics.participants.design import PeopleData, first_people, side_by_side
 from tactileq.analysis.statistics.participants.posterior import (
+    VERDICT,
+    Described,
     Draws,
     Effort,
-    choice_draws,
-    r_hat,
+    described,
     rating_draws,
+    sufficient_draws,
+    well_sampled,
 )
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.files.columns import Column, names
-from tactileq.modeling.participants.choices import ChoicePriors, ChoiceStudies, DecisionModel
-from tactileq.modeling.participants.ratings import RatingPriors, RatingStudies
+from tactileq.modeling.participants.ratings import RatingPriors
 
 FEWEST = 8  # participants
-LIKELY = 0.5  # probability above which somebody is said to be outside the bounds, or careless
-DOUBLED_CHAINS = 4  # of the posterior with doubled priors
-SHORT = Effort(chains=4, warm_up=150, steps=200, every=2)  # where verdicts of studies are counted
-MINORITY = 0.5  # a share of people below it feels a difference that the mean may not show
+LIKELY = 0.5  # probability above which somebody is said not to attend
+SHORT = Effort(chains=4, warm_up=150, steps=200)  # where verdicts of studies are counted
 
 PEOPLE_COLUMNS = (
     Column("claim", is_name=True),
@@ -48,7 +40,6 @@ PEOPLE_COLUMNS = (
     Column("effect"),
     Column("ci_low", "95% CI from"),
     Column("ci_high", "to"),
-    Column("outside", "probability of being outside the bounds", format=".2f"),
     Column("careless", "probability of not attending", format=".2f"),
 )
 TEXTURE_COLUMNS = (
@@ -63,7 +54,7 @@ TEXTURE_COLUMNS = (
 
 @dataclass(frozen=True, kw_only=True)
 class PeopleSummary:
-    """What a posterior says of people; effects in the unit of the bounds.
+    """What a posterior says of people, in points; NaN of what was not sampled well enough.
 
     Parameters
     ----------
@@ -71,15 +62,15 @@ class PeopleSummary:
         Mean effect among people who attend: median and 95 % interval.
     mean90_low, mean90_high : float
         Its 90 % interval.
-    share, share_low, share_high : float
-        Share of attending people like these whose effect lies outside the bounds: median and 95 %
-        interval.
-    share_most : float
-        The share is below it with a probability of 95 %.
-    somebody : float
-        Probability that the effect of at least one participant lies outside the bounds.
-    r_hat : float
-        The largest R̂ of mean and share.
+    sd, sd_low, sd_high : float
+        SD of people's effects, of people and days together where models were on different days:
+        median and 95 % interval.
+    careless, careless_low, careless_high : float
+        Share of people who do not attend, likewise.
+    lapses : float
+        Share of lapsed trials (posterior mean).
+    converged : bool
+        Whether the mean and the textures were sampled well enough for verdicts.
     """
 
     mean: float
@@ -87,39 +78,25 @@ class PeopleSummary:
     mean_high: float
     mean90_low: float
     mean90_high: float
-    share: float
-    share_low: float
-    share_high: float
-    share_most: float
-    somebody: float
-    r_hat: float
+    sd: float
+    sd_low: float
+    sd_high: float
+    careless: float
+    careless_low: float
+    careless_high: float
+    lapses: float
+    converged: bool
 
     def inside(self, bounds: Bounds) -> bool:
-        """Whether the mean effect lies inside the bounds, at 95 % for each of them."""
+        """Whether the 90 % interval of the mean lies inside the bounds: at 95 % for each."""
         return bounds[0] < self.mean90_low and self.mean90_high < bounds[1]
 
-    def verdict(self, bounds: Bounds, *, few: float) -> str:
-        """The verdict on all textures, whatever casts doubt on equality.
-
-        docs/method/participants.md#verdict
-
-        Parameters
-        ----------
-        bounds : (float, float)
-        few : float
-            Share of people below which those outside the bounds do not count, 0 … 0.5.
-        """
-        inside, somebody = self.inside(bounds), self.somebody >= 1 - ALPHA
+    def verdict(self, bounds: Bounds) -> str:
+        """The verdict on all textures, whatever casts doubt on equality."""
+        if not self.converged:
+            return NOT_CONVERGED
         differs = self.mean_low > 0 or self.mean_high < 0
-        if somebody and self.share_most < few:
-            return ALL_BUT
-        if somebody and inside:
-            return AVERAGE_FELT
-        if differs and not inside and not (somebody and self.share_most < MINORITY):
-            return DIFFERENT
-        if somebody:
-            return FELT
-        return EQUIVALENT if inside and self.share_most < few else INCONCLUSIVE
+        return combined(differs=differs, equals=self.inside(bounds))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -129,8 +106,8 @@ class PeopleJudged:
     Parameters
     ----------
     textures : DataFrame
-        `TEXTURE_COLUMNS`; p values are posterior probabilities: twice that of the less likely sign,
-        and the larger one of lying beyond a bound.
+        `TEXTURE_COLUMNS`; p values are those of a normal posterior of this mean and SD, in place of
+        draws beyond 0 or a bound, of which there are too few to count.
     """
 
     summary: PeopleSummary
@@ -149,45 +126,36 @@ class PeopleFound(PeopleJudged):
         With the SDs of all priors twice as large.
     people : DataFrame
         `PEOPLE_COLUMNS` without the claim.
-    lapses : float
-        Share of lapsed trials of people who attend (posterior mean).
+    given : Described
+        What people rated, (1,) and (1, n).
+    replicated : Described
+        What the same people could have rated, (S,) and (S, n) of S draws.
+    repeats : int
+        Ratings of a texture with a model, at most.
     """
 
     doubled: PeopleSummary
     people: pd.DataFrame
-    lapses: float
+    given: Described
+    replicated: Described
+    repeats: int
 
 
-def people_found(
-    studies: RatingStudies | ChoiceStudies,
-    bounds: Bounds,
-    *,
-    model: DecisionModel | None,
-    people: Sequence[str],
-    textures: Sequence[str],
-    rng: np.random.Generator,
-) -> PeopleFound:
-    """The posterior of one study, in short.
-
-    Parameters
-    ----------
-    studies : RatingStudies or ChoiceStudies
-        One study.
-    bounds : (float, float)
-    model : DecisionModel, optional
-        Of choices.
-    people, textures : sequence of str
-        In the order of the arrays.
-    """
-    (draws,) = _sampler(studies, bounds, model=model, rng=rng)(effort=Effort())
-    wide = _sampler(studies, bounds, model=model, rng=rng, doubled=True)
-    (doubled,) = wide(effort=replace(Effort(), chains=DOUBLED_CHAINS))
+def people_found(data: PeopleData, bounds: Bounds, *, rng: np.random.Generator) -> PeopleFound:
+    """The posterior of one study, in short."""
+    (draws,) = sufficient_draws(data.studies, rng=rng)
+    (doubled,) = sufficient_draws(data.studies, rng=rng, priors=RatingPriors().doubled())
     return PeopleFound(
-        summary=summary_of(draws),
+        **vars(_judged(draws, bounds, textures=data.textures)),
         doubled=summary_of(doubled),
-        people=_people_table(draws, bounds, people=people),
-        textures=_texture_table(draws, bounds, textures=textures),
-        lapses=float(draws.lapses.mean()),
+        people=_people_table(draws, people=data.people),
+        given=described(data.studies.values),
+        replicated=Described(
+            at_ends=draws.at_ends.ravel(),
+            spread=draws.spread.reshape(-1, len(data.people)),
+            repeated=draws.repeated.ravel(),
+        ),
+        repeats=int(np.isfinite(data.studies.values).sum(axis=-1).max()),
     )
 
 
@@ -204,7 +172,7 @@ def judged_by_size(
     Parameters
     ----------
     data : sequence of PeopleData
-        Of each claim; all of the same shape, with the same decision model.
+        Of each claim; all of the same shape.
     bounds : (float, float)
         Of all of them.
     effort : Effort, optional
@@ -213,85 +181,72 @@ def judged_by_size(
     Returns
     -------
     list of list of PeopleJudged
-        Of each claim, by size.
+        Of each claim, by size; called converged, since so few draws cannot tell.
     """
     parts = side_by_side([first_people(one.studies, sizes) for one in data])
-    draws = iter(_sampler(parts, bounds, model=data[0].model, rng=rng)(effort=effort or SHORT))
-    return [[_judged(next(draws), bounds, textures=one.textures) for _ in sizes] for one in data]
+    draws = iter(rating_draws(parts, rng=rng, effort=effort or SHORT))
+    return [
+        [_judged(next(draws), bounds, textures=one.textures, converged=True) for _ in sizes]
+        for one in data
+    ]
 
 
-def _judged(draws: Draws, bounds: Bounds, *, textures: Sequence[str]) -> PeopleJudged:
-    table = _texture_table(draws, bounds, textures=textures)
-    return PeopleJudged(summary=summary_of(draws), textures=table)
+def _judged(
+    draws: Draws, bounds: Bounds, *, textures: Sequence[str], converged: bool | None = None
+) -> PeopleJudged:
+    table = texture_table(draws, bounds, textures=textures)
+    return PeopleJudged(summary=summary_of(draws, converged=converged), textures=table)
 
 
-def _sampler(
-    studies: RatingStudies | ChoiceStudies,
-    bounds: Bounds,
-    *,
-    model: DecisionModel | None,
-    rng: np.random.Generator,
-    doubled: bool = False,
-) -> Callable[..., list[Draws]]:
-    if isinstance(studies, RatingStudies):
-        own = RatingPriors()
-        priors = own.doubled() if doubled else own
-        return partial(rating_draws, studies, bounds, rng=rng, priors=priors)
-    assert model is not None
-    of_choice = ChoicePriors.of(model)
-    wide = of_choice.doubled() if doubled else of_choice
-    return partial(choice_draws, studies, model, bounds, rng=rng, priors=wide)
-
-
-def summary_of(draws: Draws) -> PeopleSummary:
-    """A posterior in short."""
-    mean = np.quantile(draws.mean, [0.5, 0.025, 0.975, ALPHA, 1 - ALPHA])
-    share = np.quantile(draws.share, [0.5, 0.025, 0.975, 1 - ALPHA])
+def summary_of(draws: Draws, *, converged: bool | None = None) -> PeopleSummary:
+    """A posterior in short; `converged` in place of what its draws say."""
+    middle = (0.5, 0.025, 0.975)
+    mean = np.quantile(draws.mean, [*middle, ALPHA, 1 - ALPHA])
+    sd, careless = (
+        np.quantile(getattr(draws, name), middle) if draws.suffices(name) else np.full(3, np.nan)
+        for name in ("people_sd", "careless")
+    )
+    fields = (
+        *("mean", "mean_low", "mean_high", "mean90_low", "mean90_high"),
+        *("sd", "sd_low", "sd_high", "careless", "careless_low", "careless_high"),
+    )
+    values = map(float, (*mean, *sd, *careless))
     return PeopleSummary(
-        **dict(
-            zip(
-                ("mean", "mean_low", "mean_high", "mean90_low", "mean90_high"),
-                map(float, mean),
-                strict=True,
-            )
-        ),
-        **dict(
-            zip(("share", "share_low", "share_high", "share_most"), map(float, share), strict=True)
-        ),
-        somebody=float((draws.outside > 0).mean()),
-        r_hat=max(r_hat(draws.mean), r_hat(draws.share)),
+        **dict(zip(fields, values, strict=True)),
+        lapses=float(draws.lapses.mean()) if draws.suffices("lapses") else float("nan"),
+        converged=draws.suffices(*VERDICT) if converged is None else converged,
     )
 
 
-def _people_table(draws: Draws, bounds: Bounds, *, people: Sequence[str]) -> pd.DataFrame:
+def _people_table(draws: Draws, *, people: Sequence[str]) -> pd.DataFrame:
     effects = draws.effects.reshape(-1, len(people))
-    attends = draws.attends.reshape(-1, len(people)).mean(axis=0)
-    low, high = np.quantile(effects, [0.025, 0.975], axis=0)
-    outside = ((effects < bounds[0]) | (effects > bounds[1])).mean(axis=0)
+    middle, low, high = np.quantile(effects, [0.5, 0.025, 0.975], axis=0)
+    known, told = well_sampled(draws.effects), well_sampled(draws.attends)
+    careless = 1 - draws.attends.reshape(-1, len(people)).mean(axis=0)
     return pd.DataFrame(
         {
             "participant_id": list(people),
-            "effect": np.median(effects, axis=0),
-            "ci_low": low,
-            "ci_high": high,
-            "outside": outside,
-            "careless": 1 - attends,
+            "effect": np.where(known, middle, np.nan),
+            "ci_low": np.where(known, low, np.nan),
+            "ci_high": np.where(known, high, np.nan),
+            "careless": np.where(told, careless, np.nan),
         }
     )
 
 
-def _texture_table(draws: Draws, bounds: Bounds, *, textures: Sequence[str]) -> pd.DataFrame:
+def texture_table(draws: Draws, bounds: Bounds, *, textures: Sequence[str]) -> pd.DataFrame:
+    """`TEXTURE_COLUMNS` of a posterior."""
     means = draws.textures.reshape(-1, len(textures))
     low, high = np.quantile(means, [0.025, 0.975], axis=0)
-    above: Floats = (means > 0).mean(axis=0)
-    beyond = np.maximum((means <= bounds[0]).mean(axis=0), (means >= bounds[1]).mean(axis=0))
+    mean, sd = means.mean(axis=0), means.std(axis=0)
+    beyond: Floats = np.maximum(ndtr((bounds[0] - mean) / sd), ndtr((mean - bounds[1]) / sd))
     return pd.DataFrame(
         {
             "texture": list(textures),
             "mean": np.median(means, axis=0),
             "ci_low": low,
             "ci_high": high,
-            "p_difference": 2 * np.minimum(above, 1 - above),
+            "p_difference": 2 * ndtr(-np.abs(mean) / sd),
             "p_equivalence": beyond,
         },
         columns=names(TEXTURE_COLUMNS),

@@ -1,12 +1,10 @@
-"""What a simulated study of people with known effects holds.
-
-`validation_people` lists the ways in which these people answer.
-"""
+"""What a simulated study of people with known effects holds."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,74 +12,64 @@ from numpy.typing import NDArray
 from tactileq.modeling.arrays import Floats
 
 Shape = tuple[int, int]  # studies, people
-
-RATING_KIND, CHOICE_KIND, ODDITY_KIND = "ratings", "choice", "oddity"
-BOUNDS: Mapping[str, tuple[float, float]] = {
-    RATING_KIND: (-7.5, 7.5),  # points
-    CHOICE_KIND: (-0.1, 0.1),  # shares of right answers
-    ODDITY_KIND: (-0.1, 0.1),
-}
+POINTS, SHARES = (-7.5, 7.5), (-0.1, 0.1)  # bounds of ratings, and of shares of right answers
 N_TEXTURES = 7
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class DrawnStudies:
     """A batch of k simulated studies of n people, and what was planted in them.
 
-    Attributes
+    Parameters
     ----------
-    values : ndarray, shape (k, n, 7, M, R)
-        Ratings 0 … 100, or 1 (right) and 0 (wrong), by texture, model and repeat. M = 2
-        (reference, other) for ratings and choice; M = 1 for oddity, whose trials hold both models.
-    checks : ndarray, shape (k, n, C)
-        Ratings of anchors, or right and wrong answers in catch trials; C = 0 without either.
-    days : ndarray of int, shape (k, n, 7, M, R)
+    values : (k, n, 7, 2, R) ndarray
+        Ratings 0 … 100, or 1 (right) and 0 (wrong), by texture, model and repeat.
+    days : (n, 7, 2, R) or (k, n, 7, 2, R) ndarray of int
         Session of each trial, 0 or 1.
-    orders : ndarray, shape (k, n, 7, M, R)
+    orders : (k, n, 7, 2, R) ndarray
         Position of each trial within its session, 0 (first) … 1 (last).
-    effects : ndarray, shape (k, n)
-        Each person's own planted effect, in the unit of `mean`; NaN for who does not attend.
-    mean : float
-        Mean effect of the population that attends: latent points (ratings) or share of right
-        answers in attended trials (choice: other − reference; oddity: − chance). NaN where nobody
-        attends.
-    outside : float
-        Share of the population that attends whose own effect lies outside the bounds.
+    anchors : (k, n, A) ndarray
+        Ratings of anchors; A = 0 without any.
+    planted : (7,) ndarray
+        Mean effect of the people who attend on each texture, other − reference.
+    people_sd : float
+        SD of their normal effects; NaN where they are not normal.
+    attends : (k, n) ndarray of bool
     """
 
     values: Floats
-    checks: Floats
     days: NDArray[np.intp]
     orders: Floats
-    effects: Floats
-    mean: float
-    outside: float
+    anchors: Floats
+    planted: Floats
+    attends: NDArray[np.bool_]
+    people_sd: float = nan
 
 
-Draw = Callable[[np.random.Generator, Shape], DrawnStudies]
-
-
-@dataclass(frozen=True)
-class Situation:
+@dataclass(frozen=True, kw_only=True)
+class World:
     """A way in which people answer; called with a generator and (studies, people), it draws them.
 
-    Attributes
+    Parameters
     ----------
-    kind : str
-        `RATING_KIND`, `CHOICE_KIND` or `ODDITY_KIND`.
     line : str
         What is planted.
     draw : callable
+    bounds : (float, float)
+        In the unit of what is planted.
+    held_out : str
+        Commit of the rule that was fixed before the world was written; empty of others.
     """
 
-    kind: str
     line: str
-    draw: Draw
+    draw: Callable[[np.random.Generator, Shape], DrawnStudies]
+    bounds: tuple[float, float] = POINTS
+    held_out: str = ""
 
     @property
-    def bounds(self) -> tuple[float, float]:
-        """Outside of these an effect matters, in the unit of `DrawnStudies.mean`."""
-        return BOUNDS[self.kind]
+    def rated(self) -> bool:
+        """Whether answers are ratings."""
+        return self.bounds == POINTS
 
     def __call__(self, rng: np.random.Generator, shape: Shape) -> DrawnStudies:
         return self.draw(rng, shape)
@@ -92,34 +80,15 @@ def shuffled(rng: np.random.Generator, shape: tuple[int, ...]) -> NDArray[np.int
     return np.argsort(rng.random(shape), axis=-1)
 
 
-def counterbalanced(cells: tuple[int, ...]) -> NDArray[np.intp]:
-    """Days of trials (k, n, 7, 2, R): every other person begins with the other model."""
-    person = np.arange(cells[1])[:, None, None, None]
-    model = np.arange(2)[:, None]
-    return np.array(np.broadcast_to((person + model) % 2, cells), dtype=np.intp)
+def on_days(people: int, *, first: int) -> NDArray[np.intp]:
+    """(n, 2) days of the models, 0 and 1; so many of 20 people begin with the reference.
+
+    Spread over the people so that the first of them alone are as balanced.
+    """
+    begins = np.arange(people) * first // 20 != (np.arange(people) + 1) * first // 20
+    return np.where(begins[:, None], [0, 1], [1, 0])
 
 
 def on_slider(ratings: Floats) -> Floats:
     """Latent ratings as a slider stores them: in steps of 0.01, ended at 0 and 100."""
     return np.asarray(np.clip(np.round(ratings, 2), 0.0, 100.0))
-
-
-def normal_quantiles(count: int) -> Floats:
-    """Standard normal quantiles of `count` equal shares of people, at their middles."""
-    from scipy.special import ndtri
-
-    return np.asarray(ndtri((np.arange(count) + 0.5) / count))
-
-
-def guessed(
-    rng: np.random.Generator,
-    right: NDArray[np.bool_],
-    unsure: tuple[NDArray[np.bool_], float, float],
-) -> Floats:
-    """Right answers (k, n, trials), guessed by who is careless and in lapsed trials.
-
-    `unsure`: who is careless (k, n, 1), the share of lapsed trials, the chance of a guess.
-    """
-    careless, lapses, chance = unsure
-    guesses = careless | (rng.random(right.shape) < lapses)
-    return np.where(guesses, rng.random(right.shape) < chance, right).astype(float)

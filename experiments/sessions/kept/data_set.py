@@ -14,6 +14,7 @@ from tactileq.experiments.sessions.kept.overrides import Overrides
 from tactileq.experiments.study.study import Study
 from tactileq.modeling import InputError
 from tactileq.modeling.errors import shown
+from tactileq.modeling.files.claims import PlanSection
 from tactileq.modeling.files.documents import dump_json, read_json_object
 from tactileq.modeling.files.places import locked
 
@@ -64,10 +65,12 @@ def require_same_data_set(root: Path, manifest: SessionManifest, *, overrides: O
     Raises
     ------
     InputError
-        As `claim_data_set`.
+        As `claim_data_set`; where there is none, for a plan with a rule that was withdrawn.
     """
     path = root / DESCRIPTION_NAME
-    if os.path.lexists(path):
+    if not os.path.lexists(path):
+        PlanSection.read(manifest.study.get("plan", {})).require_current()
+    else:
         found = read_json_object(path, advice="choose another data folder for these sessions")
         _check(found, describe_data_set(manifest), path=path, overrides=overrides)
 

@@ -114,8 +114,7 @@ def device_study() -> Study:
     tables = Study.load().to_tables()
     for task in ("absolute", "relative"):
         tables[task] |= {"participants": PARTICIPANTS, "repeats": 1}
-    tables["plan"].pop("few")
-    tables["plan"]["rule"] = "tests"  # too few for a model of the participants
+    tables["plan"]["rule"] = "tests"  # too few for the model of the participants
     return Study.from_tables(tables)
 
 

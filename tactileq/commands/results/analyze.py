@@ -317,8 +317,7 @@ def _later_plan(path: Path, registered: AnalysisPlan) -> AnalysisPlan:
     from tactileq.experiments.study.study import Study
 
     later = plan_from(Study.load(path).to_dict()["plan"], path=path, sha256=registered.sha256)
-    same_rule = (later.rule, later.few) == (registered.rule, registered.few)
-    known = registered.claims if same_rule else ()
+    known = registered.claims if later.rule == registered.rule else ()
     claims = (replace(claim, planned=claim in known) for claim in later.claims)
     return replace(later, claims=tuple(claims))
 
@@ -326,7 +325,7 @@ def _later_plan(path: Path, registered: AnalysisPlan) -> AnalysisPlan:
 def validated(
     simulations: int, *, seed: int, jobs: int | None = None, dask: str | None = None
 ) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
-    """Procedures, and the model of the participants, on planted truth, and ranks of its sampler.
+    """Procedures, and the rule of verdicts, on planted truth, and ranks of the model's sampler.
 
     The same tables on any number of workers.
 

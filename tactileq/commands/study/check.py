@@ -47,6 +47,7 @@ def loaded(path: Path, reads: Callable[..., None] = lambda *paths: None) -> tupl
 
     reads(path)
     plan = Study.load(path)
+    plan.plan.require_current()
     reads(*plan.texts.values())
     texts_of_study(plan)
     require_trays(plan)
