@@ -122,9 +122,9 @@ def _predictive(found: ClaimFound, *, simulated: bool) -> Picture:
         f"Does the model describe the ratings? {found.claim.name}",
         "Posterior predictive check: what these people rated (black) among what the model says "
         "that they could have rated (blue). Left: share of ratings at either end of the scale. "
-        "Middle: SD of each person's ratings, in rising order, with 95% of what is predicted. "
-        "Right: SD of repeated ratings of a surface. Where black lies outside, the model misses "
-        "something that may matter.",
+        "Beside it: SD of each person's ratings, in rising order, with 95% of what is predicted; "
+        "and where surfaces were rated several times, the SD of repeated ratings. Where black lies "
+        "outside, the model misses something that may matter.",
         figure_predictive(found, simulated=simulated),
         simulated,
     )

@@ -17,12 +17,12 @@ from tactileq.analysis.page.drawing import (
 from tactileq.analysis.statistics.verdicts import ClaimFound
 from tactileq.modeling.arrays import Floats
 
-SIZE = (10.0, 3.6)  # inches
+WIDTH, HEIGHT = 4.4, 3.8  # inches of a panel
 BINS = 24
 
 
 def figure_predictive(found: ClaimFound, *, simulated: bool) -> Figure:
-    """Share at the ends, spread of each person, and scatter of repeats, given and predicted.
+    """Share at the ends, spread of each person and, where there are some, scatter of repeats.
 
     Parameters
     ----------
@@ -33,30 +33,33 @@ def figure_predictive(found: ClaimFound, *, simulated: bool) -> Figure:
     """
     assert found.people is not None
     given, predicted = found.people.given, found.people.replicated
-    figure = Figure(figsize=SIZE, layout="constrained")
-    ends, people, repeats = figure.subplots(1, 3)
-    _draw_share(ends, 100 * predicted.at_ends, 100 * given.at_ends[0])
-    ends.set_xlabel("ratings at an end of the scale (%)")
-    _draw_people(people, predicted.spread, given.spread[0])
-    _draw_share(repeats, predicted.repeated, given.repeated[0])
-    repeats.set_xlabel("SD of repeated ratings (points)")
-    for ax in (ends, repeats):
+    repeated = bool(np.isfinite(given.repeated[0]))
+    panels = 2 + repeated
+    figure = Figure(figsize=(WIDTH * panels, HEIGHT), layout="constrained")
+    axes = figure.subplots(1, panels)
+    _draw_shares(axes[0], 100 * predicted.at_ends, 100 * float(given.at_ends[0]))
+    _draw_people(axes[1], predicted.spread, given.spread[0])
+    if repeated:
+        axes[2].hist(predicted.repeated, bins=BINS, color=SKY_BLUE)
+        axes[2].axvline(float(given.repeated[0]), color=BLACK, lw=2)
+        axes[2].set_xlabel("SD of repeated ratings (points)")
+    for ax in axes:
+        finish_axes(ax)
+    for ax in (axes[0], *axes[2:]):
         ax.set_yticks([])
         ax.set_ylabel("how probable")
-    for ax in (ends, people, repeats):
-        finish_axes(ax)
-    stamp_if_simulated(ends, simulated)
-    shared_legend(figure, [ends, people], loc="outside lower center")
+    stamp_if_simulated(axes[-1], simulated)
+    shared_legend(figure, [axes[0], axes[1]], loc="outside lower center")
     return figure
 
 
-def _draw_share(ax: Axes, predicted: Floats, given: float) -> None:
-    known = predicted[np.isfinite(predicted)]
-    if not known.size or not np.isfinite(given):
-        ax.text(0.5, 0.5, "no surface was\nrated twice", ha="center", transform=ax.transAxes)
-        return
-    ax.hist(known, bins=BINS, color=SKY_BLUE, density=True, label="predicted")
+def _draw_shares(ax: Axes, predicted: Floats, given: float) -> None:
+    """A bar for each share that there can be, since ratings at an end are counted."""
+    shares, counts = np.unique(predicted, return_counts=True)
+    width = float(np.diff(shares).min()) if shares.size > 1 else 1.0
+    ax.bar(shares, counts, width=0.9 * width, color=SKY_BLUE, label="predicted")
     ax.axvline(given, color=BLACK, lw=2, label="given")
+    ax.set_xlabel("ratings at an end of the scale (%)")
 
 
 def _draw_people(ax: Axes, predicted: Floats, given: Floats) -> None:
@@ -65,7 +68,7 @@ def _draw_people(ax: Axes, predicted: Floats, given: Floats) -> None:
     low, high = np.quantile(ranked, [0.025, 0.975], axis=0)
     places = np.arange(1, own.size + 1)
     ax.fill_between(places, low, high, color=BLUE, alpha=0.25, lw=0, label="95% predicted")
-    ax.plot(places, own, "o", color=BLACK, ms=4)
+    ax.plot(places, own, "o", color=BLACK, ms=4, label="given, a participant")
     ax.set_xlabel("participants, in rising order")
     ax.set_ylabel("SD of a person's ratings (points)")
     ax.set_ylim(bottom=0)

@@ -14,6 +14,7 @@ from tactileq.analysis.chapters.claims.forest import figure_forest
 from tactileq.analysis.chapters.claims.people import people_items
 from tactileq.analysis.chapters.claims.plan_sentences import deviations, methods_paragraph
 from tactileq.analysis.chapters.claims.sentences import by_verdict, claim_sentences
+from tactileq.analysis.labels import SCALES
 from tactileq.analysis.page.page import Fold, Picture, Table
 from tactileq.analysis.page.sections import Section
 from tactileq.analysis.statistics.caveats import DIFFERENCES
@@ -177,6 +178,7 @@ def _in_short(found: Sequence[ClaimFound], *, simulated: bool) -> Table:
                 "ci_low": row[low],
                 "ci_high": row[high],
                 "verdict": row["verdict"] or NO_TEST,
+                "people_p": row["people_p"] if one.claim.measure in SCALES else float("nan"),
                 "textures": ", ".join(differ),
                 "beside": beside,
             }

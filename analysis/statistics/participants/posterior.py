@@ -193,10 +193,9 @@ def r_hat(draws: Floats) -> Floats:
     parts = _halves(draws)
     length = parts.shape[1]
     within, between = parts.var(axis=1, ddof=1).mean(axis=0), parts.mean(axis=1).var(axis=0, ddof=1)
-    ratio = np.where(
-        within > 0, between / np.where(within > 0, within, 1.0), np.inf * (between > 0)
-    )
-    return np.sqrt(np.where(between > 0, (length - 1) / length + ratio, 1.0))
+    varies = within > 0
+    ratio = np.where(varies, between / np.where(varies, within, 1.0), np.inf)
+    return np.where(between > 0, np.sqrt((length - 1) / length + ratio), 1.0)
 
 
 def effective_draws(draws: Floats) -> Floats:
