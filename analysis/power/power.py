@@ -24,7 +24,7 @@ from tactileq.analysis.statistics.claims import (
     words_of_people,
 )
 from tactileq.analysis.statistics.compared_answers import claim_shares, claim_values
-from tactileq.analysis.statistics.crossover import CONFOUNDED, mean_differences
+from tactileq.analysis.statistics.crossover import mean_differences
 from tactileq.analysis.statistics.draws import generators
 from tactileq.analysis.statistics.equivalence import (
     DIFFERENT,
@@ -250,10 +250,8 @@ def _p_values(
     contrasts = values.contrasts_of(differences.index)
     own = without_rounding_noise(differences.to_numpy(dtype=float))
     found = mean_differences(own[None, :], contrasts)
-    if why := why_undefined(found):
-        p = np.nan if why == CONFOUNDED else sign_flips_p(found.adjusted[0], rng=rng)
-    else:
-        p = float(t_tests(found)[1][0])
+    undefined = why_undefined(found)
+    p = sign_flips_p(found.told[0], rng=rng) if undefined else float(t_tests(found)[1][0])
     return p, equivalence_test(own, bounds, rng=rng, contrasts=contrasts).p
 
 

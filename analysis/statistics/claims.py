@@ -94,7 +94,7 @@ CLAIM_COLUMNS = (
 VERDICT_COLUMNS = chosen(
     CLAIM_COLUMNS,
     *("claim", "texture", "verdict", "rule", "n", "model_mean", "model_low", "model_high"),
-    *("p_of_model", "tests_verdict", "mean_difference", "ci90_low", "ci90_high"),
+    *("p_of_model", "tests_verdict", "model_verdict", "mean_difference", "ci90_low", "ci90_high"),
     *("bound_low", "bound_high", "p_equivalence_holm", "p_holm", "share_at_ends", "doubt"),
 )
 # For a claim with incomplete data: amount and quality of the data, and no effect.

@@ -31,9 +31,11 @@ def day_contrasts(answers: pd.DataFrame, models: tuple[str, str]) -> pd.DataFram
     -------
     DataFrame
         A row for each participant with answers to both, a column for each day but the last, from
-        −1 to 1; no column where anybody had both models in one session. A participant's days are
-        their sessions, in the order of the names.
+        −1 to 1; no column where anybody had both models in one session, or where there are no
+        sessions. A participant's days are their sessions, in the order of the names.
     """
+    if "session" not in answers:
+        return pd.DataFrame(index=answers["participant_id"].unique())
     held = answers[answers["model"].isin(models)][["participant_id", "session", "model"]]
     held = held.drop_duplicates()
     days = held.assign(day=held.groupby("participant_id")["session"].rank("dense"))
@@ -88,6 +90,11 @@ class MeanDifferences:
     def confounded(self) -> bool:
         """Whether days and models cannot be told apart."""
         return bool(self.adjusted.size and np.isnan(self.mean).all())
+
+    @property
+    def told(self) -> Floats:
+        """`adjusted`; of nobody where days and models cannot be told apart."""
+        return self.adjusted[:, :0] if self.confounded else self.adjusted
 
 
 def mean_differences(differences: Floats, contrasts: Floats | None = None) -> MeanDifferences:

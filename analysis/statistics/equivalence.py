@@ -84,7 +84,7 @@ def equivalence_test(
     rounded = without_rounding_noise(np.asarray(differences, dtype=float))
     found = mean_differences(rounded[None, :], contrasts)
     if why_undefined(found):
-        adjusted = found.adjusted[0]
+        adjusted = found.told[0]
         return EquivalenceTest(
             *(float("nan"),) * 3,
             sign_flips_p(adjusted - low, rng=rng, alternative="greater"),

@@ -91,7 +91,7 @@ def paired_test(
     undefined = why_undefined(found)
     t, p, low, high = (np.nan,) * 4 if undefined else _first(t_tests(found))
     d_low, d_high = (np.nan, np.nan) if undefined else d_z_interval(t, found.size, df=found.df)
-    differences = found.adjusted[0][: 0 if found.confounded else None]
+    differences = found.told[0]
     wilcoxon_w, wilcoxon_p = wilcoxon(differences, rng=rng)
     flipped_p = sign_flips_p(differences, rng=rng)
     return PairedTest(

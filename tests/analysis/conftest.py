@@ -18,6 +18,7 @@ from tactileq.analysis.chapters.chapter import Answered
 from tactileq.analysis.labels import ALL_TEXTURES, SCALES
 from tactileq.analysis.page.sections import Headline
 from tactileq.analysis.statistics.claims import with_people
+from tactileq.analysis.statistics.participants.posterior import Described, described
 from tactileq.analysis.statistics.participants.verdict import PeopleFound, PeopleSummary
 from tactileq.analysis.statistics.verdicts import ClaimFound, claims_found
 from tactileq.analysis.textures.results import TextureResult
@@ -207,31 +208,30 @@ def claim(
 def people_summary(
     *,
     mean: tuple[float, float, float] = (0.0, -1.0, 1.0),
-    share: tuple[float, float, float] = (0.02, 0.0, 0.1),
-    most: float = 0.08,
-    somebody: float = 0.2,
-    r_hat: float = 1.0,
+    sd: tuple[float, float, float] = (2.0, 0.1, 5.4),
+    careless: float = 0.03,
+    converged: bool = True,
 ) -> PeopleSummary:
-    """Mean and share with their 95 % intervals; the 90 % interval of the mean is as wide."""
+    """Mean and SD with their 95 % intervals; the 90 % interval of the mean is as wide."""
     return PeopleSummary(
         mean=mean[0],
         mean_low=mean[1],
         mean_high=mean[2],
         mean90_low=mean[1],
         mean90_high=mean[2],
-        share=share[0],
-        share_low=share[1],
-        share_high=share[2],
-        share_most=most,
-        somebody=somebody,
-        r_hat=r_hat,
+        sd=sd[0],
+        sd_low=sd[1],
+        sd_high=sd[2],
+        careless=careless,
+        careless_low=0.5 * careless,
+        careless_high=2 * careless,
+        lapses=0.01,
+        converged=converged,
     )
 
 
-def people_table(
-    effects: Sequence[float], *, outside: Collection[int] = (), careless: Collection[int] = ()
-) -> pd.DataFrame:
-    """Participants with these effects, and the places of those outside and of the careless."""
+def people_table(effects: Sequence[float], *, careless: Collection[int] = ()) -> pd.DataFrame:
+    """Participants with these effects, and the places of the careless."""
     places = range(len(effects))
     return pd.DataFrame(
         {
@@ -239,7 +239,6 @@ def people_table(
             "effect": effects,
             "ci_low": np.array(effects) - 4.0,
             "ci_high": np.array(effects) + 4.0,
-            "outside": [0.9 if place in outside else 0.1 for place in places],
             "careless": [0.8 if place in careless else 0.05 for place in places],
         }
     )
@@ -251,15 +250,18 @@ def by_model(
     *,
     doubled: PeopleSummary | None = None,
     people: pd.DataFrame | None = None,
-    lapses: float = 0.01,
+    decides: bool = True,
 ) -> ClaimFound:
     """A claim as if the model of the participants had found this; textures as the mean."""
     textures = found.tests["texture"][found.tests["texture"] != ALL_TEXTURES]
     outside = found.claim.bounds is not None and not summary.inside(found.claim.bounds)
+    table = people_table([0.0] * 16) if people is None else people
+    ratings = np.random.default_rng(1).normal(60.0, 8.0, (20, len(table), 4, 2, 2))
+    rated = described(np.clip(ratings, 0.0, 100.0))
     told = PeopleFound(
         summary=summary,
         doubled=doubled or summary,
-        people=people_table([0.0] * 16) if people is None else people,
+        people=table,
         textures=pd.DataFrame(
             {
                 "texture": textures,
@@ -270,10 +272,12 @@ def by_model(
                 "p_equivalence": 0.5 if outside else 0.001,
             }
         ),
-        lapses=lapses,
+        given=Described(**{name: values[:1] for name, values in vars(rated).items()}),
+        replicated=rated,
+        repeats=1,
     )
-    tests = with_people(found.tests, told, found.claim, caveats=found.caveats, few=AnalysisPlan.few)
-    return replace(found, tests=tests, people=told)
+    tests = with_people(found.tests, told, found.claim, caveats=found.caveats, decides=decides)
+    return replace(found, tests=tests, people=told, by_model=decides)
 
 
 PLAN = AnalysisPlan(

@@ -62,6 +62,7 @@ class RatingSampler:
         self.people: Bools = self._main.of_people + self._anchors.of_people > 0
         self.population = NormalPopulation(priors.mean_sd, priors.people_sd, b, rng=rng)
         self._interaction = GridSd(priors.interaction_sd, b, rng=rng)
+        self._given_count = _summed(self._main.counts, keep=3)
         # Of a single rating nothing tells it from the scatter of a person's ratings.
         twice = self._main.counts.sum(axis=-1) > 1
         self._interaction.hold(~twice.any(axis=(1, 2, 3)))
@@ -183,7 +184,7 @@ class RatingSampler:
         is careless in one step stayed so. They are drawn as if these people attended, and the
         ratio of that density to the prior's is taken back where classes are drawn.
         """
-        precision = 0.25 * self._main.given_count / self._variance[..., None]
+        precision = 0.25 * self._given_count / self._variance[..., None]
         left = self._main.answered * (
             self._main.given - own - self._texture[:, None, :, None, None]
         )
@@ -396,7 +397,6 @@ class _Answers:
         self.of_people = _summed(self.counts, keep=2)
         self.given = self.latent.copy()
         self._known = self.counts.copy()
-        self.given_count = _summed(self.counts, keep=3)
         low = self.answered & (values <= LOWEST)
         high = self.answered & (values >= HIGHEST)
         self._low, self._high = np.nonzero(low), np.nonzero(high)

@@ -187,7 +187,9 @@ def test_an_unfinished_task_shows_no_effect():
     assert table["verdict"].tolist() == [*[INTERIM] * 4, CONTROL]
     told = ["claim", "measure", "planned", "texture", "verdict", "reference", "other", "n"]
     told += ["bound_low", "bound_high", "share_at_ends", "excluded", "rule", "note"]
+    told += ["tests_verdict", "model_verdict"]
     assert table.drop(columns=told).isna().all(axis=None)
+    assert set(table[["tests_verdict", "model_verdict"]].to_numpy().ravel()) == {""}
     assert (table["n"] == PEOPLE).all()
     assert table["note"].tolist() == [*[""] * 4, IDENTICAL]
     assert not all_equivalent(table)

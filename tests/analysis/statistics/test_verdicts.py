@@ -14,7 +14,7 @@ from tactileq.analysis.answers.plan import AnalysisPlan
 from tactileq.analysis.answers.responses import PlannedTask, Responses, leave_out
 from tactileq.analysis.chapters.claims.answer import answer
 from tactileq.analysis.chapters.claims.plan_sentences import methods_paragraph
-from tactileq.analysis.chapters.claims.sentences import claim_outcomes
+from tactileq.analysis.chapters.claims.sentences import claim_sentences
 from tactileq.analysis.labels import ALL_TEXTURES
 from tactileq.analysis.power.power import verdicts
 from tactileq.analysis.statistics.caveats import (
@@ -36,6 +36,7 @@ from tactileq.analysis.statistics.described_verdicts import (
     incomplete,
     planted_verdicts,
 )
+from tactileq.analysis.statistics.crossover import CONFOUNDED
 from tactileq.analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, WITHIN_BOUNDS
 from tactileq.analysis.statistics.verdicts import ClaimFound, claim_caveats, claims_found
 from tactileq.modeling import InputError
@@ -207,7 +208,7 @@ def test_the_report_on_such_a_world_says_nothing_of_equality(world, told, plan):
     answers = rated(partial(world, draws), plan, anchors=False)
     found = claims_found(answers, rng=rng())
     assert found[0].tests["verdict"].iloc[0] == told
-    sentences = [outcome.sentence for outcome in claim_outcomes(found[:1])]
+    sentences = claim_sentences(found[0])
     sentences.append(words_of(answer(found[:1], answers)))
     for sentence in sentences:
         assert NOT_TESTED in sentence
@@ -360,7 +361,8 @@ def test_who_is_left_out_by_hand_is_gone_and_told(answers):
 
 def by_model(answers: Responses, **changes: object) -> Responses:
     """The same answers under a plan that names the model of the participants."""
-    plan = replace(answers.plan, rule="model", claims=answers.plan.claims[:1], **changes)
+    changes = {"rule": "hierarchical", **changes}
+    plan = replace(answers.plan, claims=answers.plan.claims[:1], **changes)
     return replace(answers, plan=plan)
 
 
@@ -381,10 +383,11 @@ def test_the_plan_names_the_rule_that_decides(answers, judged_once):
     pd.testing.assert_frame_equal(judged.tests[same], tested.tests[same])
     assert judged.tests["tests_verdict"].tolist() == tested.tests["verdict"].tolist()
     overall = judged.tests.iloc[0]
-    assert overall["verdict"] == judged.people.summary.verdict(judged.claim.bounds, few=0.15)
+    assert overall["verdict"] == judged.people.summary.verdict(judged.claim.bounds)
     assert overall["model_low"] < overall["model_mean"] < overall["model_high"]
     assert overall["model_mean"] == pytest.approx(overall["mean_difference"], abs=2.0)
-    assert 0 <= overall["share_low"] <= overall["share_outside"] <= overall["share_high"] <= 1
+    assert 0 <= overall["people_sd_low"] <= overall["people_sd"] <= overall["people_sd_high"]
+    assert judged.by_model
     assert sorted(judged.people.people["participant_id"]) == sorted(
         answers.answers["absolute"]["participant_id"].unique()
     )
@@ -416,3 +419,72 @@ def test_fewer_than_eight_people_are_left_to_the_tests(answers):
     (one, *_) = claims_found(small, rng=rng())
     assert one.people is None
     assert set(one.tests["rule"]) == {"tests"}
+
+
+def test_a_plan_with_the_rule_that_was_withdrawn_keeps_its_tests(answers, judged_once):
+    """The model stands beside them and changes no verdict."""
+    (old,) = claims_found(by_model(answers, rule="model"), rng=rng())[:1]
+    (tested,) = claims_found(answers, rng=rng())[:1]
+    assert not old.by_model
+    assert set(old.tests["rule"]) == {"tests"}
+    assert old.tests["verdict"].tolist() == tested.tests["verdict"].tolist()
+    assert old.people is not None
+    assert (
+        old.tests["model_verdict"].tolist() == judged_once[0].tests["model_verdict"].tolist()
+    )
+
+
+def on_days(table: pd.DataFrame, *, first: int, day: float) -> pd.DataFrame:
+    """Each model on a day of its own; so many people begin with the full ones."""
+    names = sorted(table["participant_id"].unique())
+    begins = table["participant_id"].isin(names[:first])
+    second = (table["model"] == "full") != begins
+    later = {"session": np.where(second, "ses-02", "ses-01")}
+    for scale in ("magnitude_similarity", "frequency_similarity"):
+        later[scale] = np.clip(table[scale] + day * second, 0, 100)
+    return table.assign(**later)
+
+
+@pytest.mark.parametrize(("first", "decides"), [(8, True), (11, False)])
+def test_models_on_different_days_are_told_apart_from_them(answers, first, decides):
+    """16 points from day to day: in unequal groups the plain mean would hold six of them."""
+    plain = claims_found(answers, rng=rng())[0].tests.iloc[0]
+    moved = on_days(answers.answers["absolute"], first=first, day=16.0)
+    found = claims_found(
+        replace(by_model(answers), answers={"absolute": moved}), rng=rng()
+    )[0]
+    row = found.tests.iloc[0]
+    assert found.by_day
+    assert found.by_model is decides
+    assert row["df"] == row["n"] - 2
+    assert row["mean_difference"] == pytest.approx(plain["mean_difference"], abs=1.0)
+    shift = row["mean_other"] - row["mean_reference"] - plain["mean_difference"]
+    assert shift == pytest.approx(16.0 * (2 * first - 16) / 16, abs=1.0)
+    assert row["model_mean"] == pytest.approx(plain["mean_difference"], abs=3.0)
+
+
+def test_everybody_in_the_same_order_is_no_test(answers):
+    moved = on_days(answers.answers["absolute"], first=16, day=5.0)
+    (found, *_) = claims_found(replace(answers, answers={"absolute": moved}), rng=rng())
+    assert (found.tests["verdict"] == "").all()
+    assert found.tests[["p", "p_equivalence", "mean_difference", "ci_low"]].isna().all(axis=None)
+    assert set(found.tests["note"]) == {CONFOUNDED}
+
+
+def test_people_are_counted_where_repeats_suffice_and_only_there(answers):
+    """Sixteen people of whom the first three feel 40 points, with 12 repeats of each texture."""
+    own = answers.answers["absolute"]
+    once = own.assign(repeat=0)
+    many = pd.concat([once.assign(repeat=k) for k in range(12)], ignore_index=True)
+    feels = many["participant_id"].isin(["sub-01", "sub-02", "sub-03"])
+    lower = 40.0 * (feels & (many["model"] == "simplified"))
+    noise = rng().normal(0, 6.0, len(many))
+    many["magnitude_similarity"] = np.clip(70 - lower + noise, 0, 100)
+    found = claims_found(replace(answers, answers={"absolute": many}), rng=rng())[0]
+    count = found.people_count
+    assert (count.beyond, count.people, count.repeats) == (3, 16, 12)
+    assert count.needed <= 12
+    once_only = claims_found(answers, rng=rng())[0].people_count
+    assert once_only.repeats == 1 < once_only.needed
+    assert once_only.people == 0
+    assert claims_found(answers, rng=rng())[2].people_count is None  # of right answers by model

@@ -1,8 +1,6 @@
-"""How choices come about: shares by d′ against closed and published ones, and drawn studies."""
+"""How choices come about: shares by d′ against closed and published ones."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,23 +11,14 @@ from scipy import integrate, stats
 from tactileq.modeling import InputError
 from tactileq.modeling.participants.choices import (
     ODDITY,
-    ChoicePriors,
     DecisionModel,
-    DrawnChoices,
-    StudyPeople,
-    drawn_choices,
     forced_choice,
     m_afc_share,
-    mean_effect,
     oddity_share,
 )
-from tactileq.modeling.participants.effects import EffectPriors
 from tests.refusals import refused
 
 MODELS = [ODDITY, *(forced_choice(alternatives) for alternatives in (2, 3, 7, 12))]
-
-
-# --- Shares by d′ -----------------------------------------------------------------------------
 
 
 @given(st.integers(2, 100))
@@ -131,117 +120,3 @@ def test_shares_far_beyond_the_table_are_those_at_its_ends(d_prime: float) -> No
     for model in MODELS:
         (share,) = model.share(np.array([d_prime]))
         assert model.table[0] <= share <= model.table[-1] <= 1
-
-
-# --- Priors -----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("model", [ODDITY, forced_choice(7)])
-def test_doubled_priors_have_twice_the_sds_and_the_same_means(model: DecisionModel) -> None:
-    one = ChoicePriors.of(model)
-    two = one.doubled()
-    for name in ("person", "texture", "texture_effect", "trend"):
-        assert getattr(two, f"{name}_sd") == 2 * getattr(one, f"{name}_sd")
-    assert two.effects == replace(
-        one.effects, mean_sd=2 * one.effects.mean_sd, spread=2 * one.effects.spread
-    )
-    assert two.ability == (one.ability[0], 2 * one.ability[1])
-    assert two.catch == one.catch
-    for name in ("lapses", "careless"):
-        share = [stats.beta(*getattr(priors, name)).mean() for priors in (one, two)]
-        odds = [mean / (1 - mean) for mean in share]
-        assert odds[1] == pytest.approx(2 * odds[0])
-
-
-# --- People of studies, and drawn studies --------------------------------------------------------
-
-
-def people(*, slopes: tuple[float, ...] = ()) -> StudyPeople:
-    return StudyPeople(
-        ability=np.array([[1.0, 2.0]]),
-        effect=np.array([[-0.4, 0.6]]),
-        textures=np.array([[0.0, 0.5, -0.5]]),
-        texture_effects=np.array([[0.0, 0.1, -0.1]]),
-        slopes=np.array(slopes).reshape(-1, 1),
-    )
-
-
-def test_sensitivity_by_hand() -> None:
-    d_prime = people().d_prime(2)
-    assert d_prime.shape == (1, 2, 3, 2)
-    np.testing.assert_allclose(d_prime[0, 1, 1], [2.5 - 0.35, 2.5 + 0.35])
-    np.testing.assert_allclose(
-        d_prime[..., 1] - d_prime[..., 0], people().effect[..., None] + [[0.0, 0.1, -0.1]]
-    )
-    alone = people().d_prime(1)
-    np.testing.assert_allclose(alone[0, 1, 1, 0], 2.0 + 0.5 + 0.6 + 0.1)
-    trends = np.zeros((1, 1, 2, 3, 2))
-    trends[0, 0, 0, 0, 0] = 0.5
-    moved = people(slopes=(0.8,)).d_prime(2, trends) - d_prime
-    assert moved[0, 0, 0, 0] == pytest.approx(0.4)
-    assert np.count_nonzero(moved) == 1
-
-
-def test_effects_of_shares_are_differences_or_what_lies_above_chance() -> None:
-    np.testing.assert_allclose(mean_effect(np.array([[0.6, 0.5]]), 1 / 7), [-0.1])
-    np.testing.assert_allclose(mean_effect(np.array([[0.5]]), 1 / 3), [1 / 6])
-
-
-def drawn(model: DecisionModel, priors: ChoicePriors, *, studies: int = 300) -> DrawnChoices:
-    each = (studies, 12, 3, 1 if model.both_models else 2)
-    return drawn_choices(
-        model,
-        priors,
-        asked=np.full(each, 10.0),
-        catch_asked=np.full(each[:2], 20.0),
-        trends=np.zeros((0, *each)),
-        rng=np.random.default_rng(5),
-    )
-
-
-@pytest.mark.parametrize("model", [ODDITY, forced_choice(7)])
-def test_drawn_answers_are_right_as_often_as_the_model_says(model: DecisionModel) -> None:
-    priors = replace(ChoicePriors.of(model), lapses=(2.0, 8.0), careless=(2.0, 8.0))
-    found = drawn(model, priors)
-    models = 1 if model.both_models else 2
-    rate = np.where(found.careless, 1.0, found.lapses[:, None])[..., None, None]
-    expected = 10 * (rate * model.chance + (1 - rate) * model.share(found.people.d_prime(models)))
-    z = (found.studies.right - expected) / np.sqrt(expected * (1 - expected / 10) + 1e-12)
-    assert abs(z.mean()) < 4 / np.sqrt(z.size)
-    assert z.std() == pytest.approx(1.0, abs=0.05)
-    assert ((found.studies.right >= 0) & (found.studies.right <= 10)).all()
-
-
-@pytest.mark.parametrize("model", [ODDITY, forced_choice(7)])
-def test_the_careless_guess_at_catch_trials_too(model: DecisionModel) -> None:
-    priors = replace(ChoicePriors.of(model), lapses=(1.0, 1e9), careless=(5.0, 5.0))
-    found = drawn(model, priors)
-    caught = found.studies.catch_right
-    guessed = caught[found.careless]
-    right = int(guessed.sum()), 20 * guessed.size
-    assert stats.binomtest(*right, model.chance).pvalue > 1e-3
-    attentive = caught[~found.careless].sum(), 20 * (~found.careless).sum()
-    mean = stats.beta(*priors.catch).mean()
-    assert attentive[0] / attentive[1] == pytest.approx(mean, abs=0.01)
-    assert found.careless.mean() == pytest.approx(0.5, abs=0.04)
-
-
-def test_drawn_studies_follow_their_priors() -> None:
-    priors = ChoicePriors.of(forced_choice(7))
-    found = drawn(forced_choice(7), priors, studies=4000)
-    assert stats.kstest(found.level, stats.norm(*priors.ability).cdf).pvalue > 1e-3
-    assert stats.kstest(found.lapses, stats.beta(*priors.lapses).cdf).pvalue > 1e-3
-    expected = stats.invgamma(2.0, scale=priors.person_sd**2)
-    assert stats.kstest(found.person_sd**2, expected.cdf).pvalue > 1e-3
-    within = (found.people.ability - found.level[:, None]) / found.person_sd[:, None]
-    assert stats.kstest(within.ravel(), "norm").pvalue > 1e-3
-    textures = found.people.textures.ravel()
-    assert stats.kstest(textures, stats.norm(0.0, priors.texture_sd).cdf).pvalue > 1e-3
-
-
-def test_where_trials_hold_both_models_nobody_has_an_ability_of_their_own() -> None:
-    none = EffectPriors(mean_sd=0.0, spread=0.0, weight=1.0)
-    found = drawn(ODDITY, replace(ChoicePriors.of(ODDITY), effects=none, texture_sd=0.0))
-    assert not found.level.any()
-    assert not found.people.d_prime(1).any()
-    assert not found.people.texture_effects.any()

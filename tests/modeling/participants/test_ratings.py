@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
 
-from tactileq.modeling.participants.effects import EffectPriors
 from tactileq.modeling.participants.ratings import (
     AT_END,
     HIGHEST,
@@ -28,7 +27,9 @@ from tactileq.modeling.participants.ratings import (
 
 # A study without anything that differs, but for what a test adds.
 PLAIN = RatingPriors(
-    effects=EffectPriors(mean_sd=0.0, spread=0.0, weight=1.0),
+    mean_sd=0.0,
+    people_sd=0.0,
+    interaction_sd=0.0,
     level=(50.0, 0.0),
     person_sd=0.0,
     cell_sd=0.0,
@@ -44,10 +45,10 @@ PLAIN = RatingPriors(
 
 
 def drawn(
-    priors: RatingPriors, *, studies: int = 200, people: int = 10, seed: int = 1
+    priors: RatingPriors, *, studies: int = 200, people: int = 10, repeats: int = 2, seed: int = 1
 ) -> DrawnRatings:
-    trends = np.zeros((2, studies, people, 3, 2, 2))
-    trends[0, ..., 1] = 0.5
+    trends = np.zeros((2, studies, people, 3, 2, repeats))
+    trends[0, ..., 1:] = 0.5
     return drawn_ratings(priors, trends=trends, anchors=2, rng=np.random.default_rng(seed))
 
 
@@ -91,11 +92,10 @@ def test_careless_people_have_an_sd_of_their_own() -> None:
 def test_doubled_priors_have_twice_the_sds_and_the_same_means() -> None:
     one = RatingPriors()
     two = one.doubled()
-    for name in ("person", "cell", "anchor", "texture", "texture_effect", "trend", "rating"):
-        assert getattr(two, f"{name}_sd") == 2 * getattr(one, f"{name}_sd")
-    assert two.effects == replace(
-        one.effects, mean_sd=2 * one.effects.mean_sd, spread=2 * one.effects.spread
-    )
+    sds = [name for name in vars(one) if name.endswith("_sd")]
+    assert len(sds) == 10
+    for name in sds:
+        assert getattr(two, name) == 2 * getattr(one, name)
     for name in ("level", "anchor"):
         assert getattr(two, name) == (getattr(one, name)[0], 2 * getattr(one, name)[1])
     for name in ("lapses", "careless"):
@@ -118,30 +118,53 @@ def test_a_study_in_which_nothing_differs_is_one_of_equal_ratings() -> None:
     assert not found.careless.any()
 
 
+def apart(found: DrawnRatings) -> np.ndarray:
+    """(B, n, T) other − reference."""
+    means = found.studies.values.mean(axis=-1)
+    return means[..., 1] - means[..., 0]
+
+
 def test_an_effect_is_the_difference_between_the_two_models() -> None:
-    """Far from the ends: the mean over people of other − reference is that of the mixture."""
-    effects = EffectPriors(mean_sd=5.0, spread=2.0, weight=1.0)
-    found = drawn(replace(PLAIN, effects=effects), people=2000, studies=20)
-    apart = (found.studies.values[:, :, :, 1] - found.studies.values[:, :, :, 0]).mean(axis=(2, 3))
-    spread = apart.std(axis=1) / np.sqrt(2000)
-    assert (np.abs(apart.mean(axis=1) - found.mixture.mean()) < 4 * spread).all()
-    outside = (np.abs(apart) > 4.0).mean(axis=1)
-    np.testing.assert_allclose(outside, found.mixture.share_outside((-4.0, 4.0)), atol=0.05)
+    """Far from the ends, without noise: of each person, and the same on all textures."""
+    found = drawn(replace(PLAIN, mean_sd=5.0, people_sd=2.0), people=500, studies=300)
+    differences = apart(found)
+    np.testing.assert_allclose(differences, np.repeat(found.effects[..., None], 3, axis=2))
+    assert stats.kstest(found.mean, stats.norm(0.0, 5.0).cdf).pvalue > 1e-3
+    assert stats.kstest(found.people_sd, stats.halfnorm(scale=2.0).cdf).pvalue > 1e-3
+    scaled = (found.effects - found.mean[:, None]) / found.people_sd[:, None]
+    assert stats.kstest(scaled.ravel(), "norm").pvalue > 1e-3
+
+
+def test_deviations_on_single_textures_are_those_of_people_and_of_all() -> None:
+    alike = drawn(replace(PLAIN, texture_effect_sd=5.0))
+    np.testing.assert_allclose(apart(alike), np.repeat(alike.texture_effects[:, None], 10, axis=1))
+    np.testing.assert_allclose(alike.texture_effects.sum(axis=1), 0.0, atol=1e-9)
+    # Without a mean over three textures two thirds of the variance remain.
+    of_textures = stats.norm(0.0, 5.0 * np.sqrt(2 / 3))
+    assert stats.kstest(alike.texture_effects[:, 0], of_textures.cdf).pvalue > 1e-3
+    own = drawn(replace(PLAIN, interaction_sd=4.0), studies=300)
+    assert stats.kstest(own.interaction_sd, stats.halfnorm(scale=4.0).cdf).pvalue > 1e-3
+    scaled = apart(own) / own.interaction_sd[:, None, None]
+    assert stats.kstest(scaled.ravel(), "norm").pvalue > 1e-3
+
+
+def test_of_single_ratings_there_are_no_deviations_to_be_known() -> None:
+    found = drawn(replace(PLAIN, interaction_sd=4.0), repeats=1)
+    assert not found.interaction_sd.any()
+    np.testing.assert_allclose(apart(found), 0.0, atol=1e-12)
 
 
 def test_trends_are_added_by_their_place() -> None:
     found = drawn(replace(PLAIN, trend_sd=5.0), studies=400)
-    apart = found.studies.values[..., 1] - found.studies.values[..., 0]
-    slopes = 2 * apart[:, 0, 0, 0]
-    np.testing.assert_allclose(apart, np.broadcast_to(slopes[:, None, None, None] / 2, apart.shape))
+    later = found.studies.values[..., 1] - found.studies.values[..., 0]
+    slopes = 2 * later[:, 0, 0, 0]
+    np.testing.assert_allclose(later, np.broadcast_to(slopes[:, None, None, None] / 2, later.shape))
     assert stats.kstest(slopes, stats.norm(0.0, 5.0).cdf).pvalue > 1e-3
 
 
 def test_nothing_that_is_presented_matters_to_the_careless() -> None:
-    effects = EffectPriors(mean_sd=20.0, spread=5.0, weight=1.0)
-    priors = replace(
-        PLAIN, effects=effects, texture_sd=10.0, careless=(1e9, 1.0), careless_scale=1e-12
-    )
+    felt = replace(PLAIN, mean_sd=20.0, people_sd=5.0, interaction_sd=5.0, texture_effect_sd=9.0)
+    priors = replace(felt, texture_sd=10.0, careless=(1e9, 1.0), careless_scale=1e-12)
     found = drawn(priors, studies=5)
     assert found.careless.all()
     np.testing.assert_allclose(found.studies.values, 50.0, atol=1e-2)
