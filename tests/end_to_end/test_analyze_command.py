@@ -92,7 +92,7 @@ def test_claims_are_those_of_the_study_and_others_exploratory(
     registered = read_answers({"": data}, ()).plan
     same = LATER.replace("[-9, 9]", "[-7.5, 7.5]")
     another_rule = same.replace("participants = 4", "participants = 8").replace(
-        "[[plan.claims]]", '[plan]\nrule = "model"\n[[plan.claims]]'
+        "[[plan.claims]]", '[plan]\nrule = "hierarchical"\n[[plan.claims]]'
     )
     for text, known in ((LATER, False), (same, True), (another_rule, False)):
         later.write_text(text)

@@ -184,7 +184,7 @@ def _in_short(found: Sequence[ClaimFound], *, simulated: bool) -> Table:
             }
         )
     return Table(
-        "verdicts",
+        "claims_in_short",
         "Each claim in a row",
         "Difference: other − reference, over the textures whose models differ, in points of the "
         "scale or shares of right answers, by what decides. Everything else is in the supplement.",

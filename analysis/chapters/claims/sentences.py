@@ -24,6 +24,7 @@ from tactileq.analysis.statistics.caveats import (
     WITHOUT_EQUALITY,
 )
 from tactileq.analysis.statistics.claims import CONTROL, NO_TEST, all_equivalent
+from tactileq.analysis.statistics.crossover import CONFOUNDED
 from tactileq.analysis.statistics.equivalence import (
     DIFFERENT,
     EQUIVALENT,
@@ -70,7 +71,8 @@ def claim_in_short(found: ClaimFound, row: Row, *, what: str, where: str = "") -
         said = TOO_LARGE
     elif found.claim.bounds is None and verdict in (DIFFERENT, INCONCLUSIVE):
         said = NOT_DIFFERENT if verdict == INCONCLUSIVE else "a difference is shown"
-    because = f": {row['note']}" if row["note"] else ", because answers are incomplete"
+    confounded = row["note"] == CONFOUNDED
+    because = f": {CONFOUNDED}" if confounded else ", because answers are incomplete"
     said = said.format(doubt=row["doubt"], because=because)
     if verdict in (INTERIM, NO_TEST, NOT_CONVERGED):
         return f"{sentence_case(what)}{where}: {said}."

@@ -435,11 +435,10 @@ def test_claims_come_from_the_study_that_was_run(study_folder, write_task, absol
     assert found.claims[0].planned
     assert (found.exclusions, found.highest_share_at_ends) == (("who slept",), 0.3)
     assert found.sha256 == ("ab",)
-    assert (found.rule, found.few) == ("tests", 0.15)  # as of a version that named no rule
-    for stated_rule, few in (({"rule": "model"}, 0.15), ({"rule": "model", "few": 0.2}, 0.2)):
-        _describe(study_folder, StudyDesign={"plan": {"claims": [stated], **stated_rule}})
-        found = load_responses(study_folder).plan
-        assert (found.rule, found.few) == ("model", few)
+    assert found.rule == "tests"  # as of a version that named no rule
+    for rule in ({"rule": "hierarchical"}, {"rule": "model"}, {"rule": "model", "few": 0.2}):
+        _describe(study_folder, StudyDesign={"plan": {"claims": [stated], **rule}})
+        assert load_responses(study_folder).plan.rule == rule["rule"]
     for wrong in ({"rule": "bayes"}, {"few": 0.6}, {"few": "0.1"}, {"few": True}):
         _describe(study_folder, StudyDesign={"plan": {"claims": [stated], **wrong}})
         (fact,) = wrong.values()

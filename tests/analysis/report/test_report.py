@@ -186,11 +186,12 @@ def test_many_columns_are_set_smaller_on_paper(folder):
 
 def test_the_answer_comes_first(folder, shown):
     html = (folder / "report.html").read_text(encoding="utf-8")
-    answer = "In a simulation without people, simplified compared with full models, over all"
+    answer = "In a simulation without people, simplified compared with full models "
     assert html.index("</h1>") < html.index(answer) < html.index("<nav>")
-    overall = shown.text.index("(rated similarity of vibration magnitude, simplified − full):")
-    textures = shown.text.index("different: PVC −")
-    assert overall < textures < shown.text.index("Simplification dropped")
+    overall = shown.text.index("Rated similarity of vibration magnitude: ")
+    table = shown.text.index("Each claim in a row")
+    tests = shown.text.index("(rated similarity of vibration magnitude, simplified − full):")
+    assert overall < table < tests < shown.text.index("Simplification dropped")
     assert shown.text.index("Forced choice, full model") < shown.text.index("Most frequent")
 
 
@@ -201,9 +202,9 @@ def test_a_chapter_begins_with_its_answer_and_one_picture(folder):
     for anchor, text in chapters[1:]:
         opening, *supplement = text.split('<details class="supplement">')
         assert opening.count("<figure") <= 1, anchor
-        assert "<table" not in opening, anchor
+        assert opening.count("<table") == (anchor == "verdicts"), anchor
         assert len(supplement) <= 1, anchor
-        if anchor != "origin":
+        if anchor not in ("origin", "verdicts"):
             assert re.match(r'<h2>[^<]+</h2><p class="answer">', opening), anchor
     pictured = [anchor for anchor, text in chapters if "<figure" in text]
     assert {"overview", "ratings", "models", "planted", "parameters"} <= set(pictured)
@@ -225,8 +226,10 @@ def test_the_supplement_is_a_file_of_its_own(folder, shown):
     for reference in behind.references:
         assert reference.startswith(("#", "data:image/png;base64,"))
     tables = {name for name in behind.identifiers if name.startswith("table-")}
-    # On paper the report has no table: all of them are in the supplement.
-    assert tables == {name for name in shown.identifiers if name.startswith("table-")}
+    # On paper the report has one table: all others are in the supplement.
+    every = {name for name in shown.identifiers if name.startswith("table-")}
+    assert every - tables == {"table-claims_in_short"}
+    assert tables < every
     pictures = {name for name in behind.identifiers if name.startswith("figure-")}
     whole = {name for name in shown.identifiers if name.startswith("figure-")}
     opening = {"figure-ratings", "figure-paper", "figure-planted_course"}
@@ -275,13 +278,16 @@ def test_nothing_of_an_unfinished_task_compares_models(tmp_path, ratings, choice
         file.stem: pd.read_csv(file, sep="\t", na_values="n/a")
         for file in tmp_path.glob("tables/*")
     }
-    assert set(tables) == {"claims", "claim_tests", "agreement", "raters", "careless", "provenance"}
-    for name in ("claims", "claim_tests"):
+    of_claims = ("claims", "claim_tests", "claims_in_short")
+    others = {"claim_sentences", "agreement", "raters", "careless", "provenance"}
+    assert set(tables) == {*of_claims, *others}
+    assert not tables["claim_sentences"]["sentence"].str.contains("CI|points").any()
+    for name in of_claims:
         told = tables[name]
         assert set(told["verdict"]) == {"interim, no verdict"}
         assert (told["n"] == 16).all()
         numbers = told.drop(columns="n").select_dtypes("number").dropna(axis=1, how="all")
-        assert set(numbers) <= {"share_at_ends"}
+        assert set(numbers) <= {"share_at_ends", "bound_low", "bound_high"}
     assert "right answers at chance" not in set(tables["careless"]["sign"])
     assert not list(tmp_path.glob("figures/*"))
     assert "16 of 20planned participants, absolute evaluation" in shown.text

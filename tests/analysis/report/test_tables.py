@@ -19,6 +19,7 @@ from tactileq.analysis.chapters.chapter import Stream
 from tactileq.analysis.chapters.choices import section as choices_chapter
 from tactileq.analysis.chapters.claims import section as claims
 from tactileq.analysis.chapters.claims.people import PRIORS_COLUMNS
+from tactileq.analysis.chapters.claims.section import IN_SHORT_COLUMNS, IN_WORDS_COLUMNS
 from tactileq.analysis.chapters.confusions import section as confusions
 from tactileq.analysis.chapters.confusions.buttons import BUTTON_COLUMNS
 from tactileq.analysis.chapters.confusions.section import (
@@ -104,6 +105,8 @@ PAGE = Path(tactileq.analysis.page.page.__file__)
 DECLARED = {
     "paper": FINDING_COLUMNS,
     "claims": VERDICT_COLUMNS,
+    "claims_in_short": IN_SHORT_COLUMNS,
+    "claim_sentences": IN_WORDS_COLUMNS,
     "claim_tests": CLAIM_COLUMNS,
     "people": PEOPLE_COLUMNS,
     "people_priors": PRIORS_COLUMNS,

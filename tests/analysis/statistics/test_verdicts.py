@@ -31,12 +31,12 @@ from tactileq.analysis.statistics.compared_answers import (
     claim_values,
     pairs_of,
 )
+from tactileq.analysis.statistics.crossover import CONFOUNDED
 from tactileq.analysis.statistics.described_verdicts import (
     check_complete,
     incomplete,
     planted_verdicts,
 )
-from tactileq.analysis.statistics.crossover import CONFOUNDED
 from tactileq.analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, WITHIN_BOUNDS
 from tactileq.analysis.statistics.verdicts import ClaimFound, claim_caveats, claims_found
 from tactileq.modeling import InputError
@@ -429,9 +429,7 @@ def test_a_plan_with_the_rule_that_was_withdrawn_keeps_its_tests(answers, judged
     assert set(old.tests["rule"]) == {"tests"}
     assert old.tests["verdict"].tolist() == tested.tests["verdict"].tolist()
     assert old.people is not None
-    assert (
-        old.tests["model_verdict"].tolist() == judged_once[0].tests["model_verdict"].tolist()
-    )
+    assert old.tests["model_verdict"].tolist() == judged_once[0].tests["model_verdict"].tolist()
 
 
 def on_days(table: pd.DataFrame, *, first: int, day: float) -> pd.DataFrame:
@@ -450,9 +448,7 @@ def test_models_on_different_days_are_told_apart_from_them(answers, first, decid
     """16 points from day to day: in unequal groups the plain mean would hold six of them."""
     plain = claims_found(answers, rng=rng())[0].tests.iloc[0]
     moved = on_days(answers.answers["absolute"], first=first, day=16.0)
-    found = claims_found(
-        replace(by_model(answers), answers={"absolute": moved}), rng=rng()
-    )[0]
+    found = claims_found(replace(by_model(answers), answers={"absolute": moved}), rng=rng())[0]
     row = found.tests.iloc[0]
     assert found.by_day
     assert found.by_model is decides

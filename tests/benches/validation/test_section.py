@@ -12,7 +12,7 @@ from tactileq.benches.validation.section import validation_section
 
 # What the model of the participants said, and its ranks: two rows, one of which misses an aim.
 OF_MODEL = pd.DataFrame(
-    [["base 60", ""], ["base 90", "coverage"]], columns=["situation", "missed"]
+    [["none, SD 2", ""], ["base 95", "coverage"]], columns=["world", "missed"]
 ).reindex(columns=[column.name for column in MODEL_COLUMNS])
 RANKS = pd.DataFrame(columns=[column.name for column in RANK_COLUMNS])
 

@@ -235,8 +235,8 @@ CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
         ("least = 18\nmost = 99\n", "least = 1.2\nmost = 1.8\n", "got 1.2 to 1.8"),
         ("least = 18\n", "least = 99\n", "least and most, or two levels"),
         ('"right", "left", "both"', '"right", "right"', "for levels under"),
-        ('rule = "model" ', 'rule = "tests" ', "few in .* beside rule .* got 0.15"),
-        ('rule = "model" ', "", "few in .* beside rule .* got 0.15"),
+        ('rule = "hierarchical" ', "few = 0.15 ", r"few in \[plan\] .* got 0.15 .* remove it"),
+        ('rule = "hierarchical" ', 'rule = "hierarchical"\nfew = 0.2 ', "got 0.2 .* remove it"),
         (ABSOLUTE, ABSOLUTE.replace("20", "7"), r"8 participants or more in \[absolute.* got 7"),
         ('measure = "correct"', 'measure = "accuracy"', "got 'accuracy'"),
         (
@@ -288,7 +288,8 @@ def test_a_study_of_an_earlier_version_keeps_its_values_and_its_hash() -> None:
 def test_texts_of_ones_own_are_no_part_of_what_identifies_a_study(tmp_path: Path) -> None:
     """What they say is in the data by its hash; the hash is that of the version before them."""
     shipped = Study.load()
-    assert shipped.sha256 == "6c4d77728ef81c575fdf2bd5af6f9802801f80804b3585b468c57dd03c23ec84"
+    of_then = replace(shipped, plan=replace(shipped.plan, rule="model"))
+    assert of_then.sha256 == "6c4d77728ef81c575fdf2bd5af6f9802801f80804b3585b468c57dd03c23ec84"
     assert "texts" not in shipped.to_dict()
     own = replace(shipped, texts={"ja": tmp_path / "ja.toml"})
     assert (own.sha256, own.to_dict()) == (shipped.sha256, shipped.to_dict())
@@ -313,18 +314,27 @@ def test_texts_are_files_beside_the_study_by_language(tmp_path: Path) -> None:
 
 def test_the_rule_of_verdicts_is_part_of_the_plan() -> None:
     shipped = Study.load()
-    assert (shipped.plan.rule, shipped.plan.few) == ("model", 0.15)
-    fewer = replace(shipped.plan, few=0.1)
-    assert len({p.sha256 for p in (shipped.plan, fewer, replace(shipped.plan, rule="tests"))}) == 3
-    assert PlanSection.read(fewer.to_dict()) == fewer
-    assert PlanSection.read({"rule": "model"}).few == 0.15
-    with refused(InputError, expected="model", got=[0.1, "tests"]):
-        PlanSection(few=0.1)
+    assert shipped.plan.rule == "hierarchical"
+    assert "few" not in shipped.plan.to_dict()
+    rules = [replace(shipped.plan, rule=rule) for rule in ("hierarchical", "tests", "model")]
+    fewer = replace(rules[2], few=0.1)
+    assert len({plan.sha256 for plan in (*rules, fewer)}) == 4
+    assert [PlanSection.read(plan.to_dict()) for plan in (*rules, fewer)] == [*rules, fewer]
+    for plan in rules[:2]:
+        plan.require_current()
+        with refused(InputError, expected="model", got=[0.1, plan.rule]):
+            replace(plan, few=0.1)
+    with refused(InputError, expected=["hierarchical", "tests"], got=["model", "few"]):
+        fewer.require_current()
     with refused(InputError, expected=8, got=7, names=["absolute", 'rule = "tests"']):
         replace(shipped, tasks={"absolute": replace(shipped.plan_of("absolute"), participants=7)})
     seven = {"absolute": replace(shipped.plan_of("absolute"), participants=7)}
     tested = replace(shipped, plan=replace(shipped.plan, rule="tests"), tasks=seven)
     assert tested.plan_of("absolute").participants == 7
+    of_choices = [claim for claim in shipped.plan.claims if claim.measure == "correct"]
+    decided_by_tests = replace(shipped.plan, claims=tuple(of_choices))
+    few = {"relative": replace(shipped.plan_of("relative"), participants=4)}
+    assert replace(shipped, plan=decided_by_tests, tasks=few).plan_of("relative").participants == 4
     unclaimed = replace(shipped, plan=replace(shipped.plan, claims=()), tasks=seven)
     assert unclaimed.plan_of("absolute").participants == 7
 

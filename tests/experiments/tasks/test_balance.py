@@ -258,11 +258,11 @@ def test_the_page_states_catch_trials_and_what_they_cost(planned: Study, models:
 def test_the_page_says_which_rule_decides(planned: Study, models: ModelSets) -> None:
     tested = plan_page(planned, models)
     eight = replace(planned.plan_of("absolute"), participants=8)
-    plan = replace(planned.plan, rule="model", few=0.125)
+    plan = replace(planned.plan, rule="hierarchical")
     modelled = plan_page(
         replace(planned, plan=plan, tasks={**planned.tasks, "absolute": eight}), models
     )
-    for fact in ("hierarchical model", "12.5 %", "95 %", "beside"):
+    for fact in ("hierarchical model", "90 %", "95 %", "beside", "days"):
         assert fact in modelled
     assert "hierarchical model" not in tested
     # The tests decide nothing there, so no claim names them as its own.

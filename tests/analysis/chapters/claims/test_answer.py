@@ -11,12 +11,12 @@ from tactileq.analysis.answers.plan import AnalysisPlan
 from tactileq.analysis.answers.responses import PlannedTask, Responses
 from tactileq.analysis.chapters.claims.answer import answer, unfinished_tasks
 from tactileq.analysis.chapters.claims.plan_sentences import deviations, methods_paragraph
-from tactileq.analysis.chapters.claims.sentences import claim_outcomes, difference, overall_row
+from tactileq.analysis.chapters.claims.sentences import claim_sentences
 from tactileq.analysis.labels import ALL_TEXTURES
 from tactileq.analysis.page.outcomes import Outcome, Weight
 from tactileq.analysis.page.sections import Section
 from tactileq.analysis.statistics.claims import CONTROL
-from tactileq.analysis.statistics.verdicts import ClaimFound, claims_found
+from tactileq.analysis.statistics.verdicts import ClaimFound, claims_found, overall_row
 from tests.analysis.conftest import words_of
 
 pytestmark = pytest.mark.usefixtures("few_draws")
@@ -59,47 +59,56 @@ def with_verdict(found: list[ClaimFound], verdict: str) -> list[ClaimFound]:
 def test_the_answer_is_the_verdicts_with_their_intervals(people, own):
     headline = answer(own, people)
     assert headline is not None
-    assert headline.subject == "Simplified compared with full models, over all textures:"
+    names = "aluminum, canvas, leather, MDF, polyester, PVC and wall paper"
+    assert headline.subject == f"Simplified compared with full models, over {names}:"
+    assert len(headline.points) == len(own)
     assert all(point.endswith(".") for point in headline.points)
-    sentence = words_of(headline)
-    for one in own:
+    for one, point in zip(own, headline.points, strict=True):
         row = overall_row(one)
         assert row is not None
-        assert difference(one, row, confidence="90%") in sentence
-    low, high = (f"{own[0].tests.iloc[0][name]:+.1f}" for name in ("ci90_low", "ci90_high"))
-    shown = f"(90% CI {low} to {high}, bounds -7.5 to +7.5)".replace("-", "−")
-    assert shown in sentence
-    assert "bounds −10.0 to +10.0)" in sentence
-    named = "Single textures that differ: PVC (rated similarity of vibration magnitude)"
-    assert headline.points[-1].startswith(named)
+        equal = row["verdict"] in ("equivalent", "equivalence withheld")
+        ends, level = (("ci90_low", "ci90_high"), "90") if equal else (("ci_low", "ci_high"), "95")
+        factor = 100 if one.claim.measure == "correct" else 1
+        low, high = (f"{factor * row[name]:+.1f}".replace("-", "−") for name in ends)
+        assert f"({level}% CI {low} to {high}; allowed ±" in point
+    assert "PVC (" in headline.points[0]
+
+
+def test_claims_about_other_textures_name_their_own(people):
+    own = analysed(people)
+    fewer = own[1].tests.copy()
+    fewer.loc[fewer["texture"] == "canvas", "verdict"] = CONTROL
+    headline = answer([own[0], replace(own[1], tests=fewer)], people)
+    assert "over" not in headline.subject
+    assert "canvas" in headline.points[0].split(":")[0]
+    assert "(1 more has identical models)" in headline.points[1].split(":")[0]
 
 
 @pytest.mark.parametrize(
     ("verdict", "words"),
     [
-        ("equivalent", "equivalent in rated similarity of vibration magnitude"),
-        ("different", "different in rated similarity"),
-        ("different but within bounds", "different, but within the bounds, in rated"),
-        ("inconclusive", "inconclusive in rated similarity"),
-        ("interim, no verdict", "no verdict before the study is complete on rated"),
-        ("", "not tested, because answers are incomplete, in rated"),
+        ("equivalent", "equivalent"),
+        ("different", "a difference is shown"),
+        ("different but within bounds", "no more than allowed"),
+        ("inconclusive", "inconclusive"),
+        ("interim, no verdict", "no verdict before the study is complete"),
+        ("", "because answers are incomplete"),
     ],
 )
 def test_each_verdict_has_its_words(people, found, verdict, words):
-    sentence = words_of(answer(with_verdict(found, verdict), people))
-    assert words in sentence.lower()
-    # Those of one verdict stand together.
-    assert " and the correct rate" in sentence
-    assert ("CI" in sentence) == (not verdict.startswith("interim"))
+    headline = answer(with_verdict(found, verdict), people)
+    for point in headline.points:
+        assert words in point
+        assert ("CI" in point) == (verdict not in ("interim, no verdict", ""))
 
 
 def test_why_equality_is_withheld_is_said(people, found):
     withheld = with_verdict(found, "equivalence withheld")
     alike = replace(withheld[1], tests=withheld[1].tests.assign(doubt="all alike"))
     assert "since all alike" in words_of(answer([alike], people))
-    assert "withheld, since all alike" in claim_outcomes([alike])[0].sentence
-    assert "BF₀₁" not in claim_outcomes([alike])[0].sentence
-    assert "BF₀₁" in claim_outcomes([found[1]])[0].sentence
+    assert "withheld, since all alike" in claim_sentences(alike)[0]
+    assert "BF₀₁" not in claim_sentences(alike)[0]
+    assert "BF₀₁" in claim_sentences(found[1])[0]
 
 
 def test_without_a_plan_nothing_is_called_equal(people):
@@ -108,7 +117,7 @@ def test_without_a_plan_nothing_is_called_equal(people):
     assert "(exploratory: nothing was planned)" in sentence
     assert "equivalent" not in sentence
     assert "95% CI" in sentence
-    assert "bounds" not in sentence.replace("without bounds equivalence cannot be tested", "")
+    assert "allowed" not in sentence
     [first, *_] = deviations(bare, analysed(bare))
     assert first.startswith("No claim was registered before the first answer")
 
@@ -126,7 +135,7 @@ def test_an_unfinished_study_answers_so_far(people):
     begun = replace(people, planned={"relative": PlannedTask(24, 48, repeats=3)})
     sentence = told(begun)
     assert sentence.startswith("So far, simplified compared with full models")
-    assert "no verdict before the study is complete on the correct rate" in sentence.lower()
+    assert "Correct rate: no verdict before the study is complete" in sentence
     assert unfinished_tasks(begun) == [
         "forced choice: 16 of 24 planned participants, 16 of 48 planned sessions"
     ]
@@ -147,16 +156,12 @@ def test_nothing_is_answered_where_nothing_can_be(people, choices):
 def test_every_texture_is_told_with_its_verdict(people):
     same = replace(people, equal={"canvas": [("full", "simplified")]})
     found = analysed(same)
-    outcomes = claim_outcomes(found)
-    assert [outcome.weight for outcome in outcomes[::2]] == [Weight.OVERALL] * 3
-    assert [outcome.weight for outcome in outcomes[1::2]] == [
-        *(Weight.TEXTURES, Weight.TEXTURES, Weight.SECONDARY)
-    ]
-    for one, outcome in zip(found, outcomes[1::2], strict=True):
+    for one in found:
+        _, sentence = claim_sentences(one)
         for row in one.tests.iloc[1:].to_dict("records"):
-            assert row["texture"] in outcome.sentence
-            assert row["verdict"] in (CONTROL, *outcome.sentence.replace(":", ";").split("; "))
-        assert "identical models, nothing to compare: canvas" in outcome.sentence
+            assert row["texture"] in sentence
+            assert row["verdict"] in (CONTROL, *sentence.replace(":", ";").split("; "))
+        assert "identical models, nothing to compare: canvas" in sentence
 
 
 def test_deviations_name_who_was_left_out_and_what_was_not_planned(people, plan):

@@ -1,4 +1,4 @@
-"""Verdicts of the model of the participants as they are told: people first, with their limits."""
+"""What is said of people, and of the model that tells it: as far as the data can tell."""
 
 from __future__ import annotations
 
@@ -19,55 +19,43 @@ from tactileq.analysis.chapters.claims.people import (
     people_table,
     priors_table,
 )
-from tactileq.analysis.chapters.claims.people_sentences import FEEL_IT, about, headline
+from tactileq.analysis.chapters.claims.people_sentences import do_people_differ, how_many
 from tactileq.analysis.chapters.claims.plan_sentences import deviations, methods_paragraph
 from tactileq.analysis.chapters.claims.section import sections
-from tactileq.analysis.chapters.claims.sentences import claim_outcomes, overall_row
-from tactileq.analysis.page.outcomes import Weight
+from tactileq.analysis.chapters.claims.sentences import claim_in_short, claim_sentences
+from tactileq.analysis.page.page import Fold
 from tactileq.analysis.report.report import write_report
-from tactileq.analysis.statistics.caveats import INTERIM, WITHHELD
+from tactileq.analysis.statistics.caveats import INTERIM, NOT_CONVERGED, WITHHELD
 from tactileq.analysis.statistics.equivalence import (
-    ALL_BUT,
-    AVERAGE_FELT,
     DIFFERENT,
-    EQUAL_ON_AVERAGE,
     EQUIVALENT,
-    FELT,
     INCONCLUSIVE,
     WITHIN_BOUNDS,
 )
 from tactileq.analysis.statistics.participants.posterior import Effort
-from tactileq.analysis.statistics.participants.verdict import DOUBLED_CHAINS, PeopleSummary
-from tactileq.analysis.statistics.verdicts import ClaimFound, claims_found
+from tactileq.analysis.statistics.participants.verdict import PeopleSummary
+from tactileq.analysis.statistics.people import PeopleCount
+from tactileq.analysis.statistics.verdicts import ClaimFound, claims_found, overall_row
+from tactileq.modeling.files.claims import WITHDRAWN
 from tactileq.modeling.files.writing import file_stem
-from tactileq.modeling.participants.choices import ODDITY, ChoicePriors, forced_choice
 from tactileq.modeling.participants.ratings import RatingPriors
 from tests.analysis.conftest import answered_of, by_model, people_summary, rating_table, words_of
-from tests.analysis.conftest import people_table as people
 
 pytestmark = pytest.mark.usefixtures("few_draws")
 
 ROOT = Path(__file__).parents[4]
-SOME = {"share": (0.42, 0.25, 0.58), "most": 0.55, "somebody": 1.0}
-FEW = {"share": (0.09, 0.04, 0.16), "most": 0.14, "somebody": 0.99}
 SUMMARIES = {
-    EQUIVALENT: people_summary(mean=(-0.4, -1.2, 0.4), share=(0.02, 0.0, 0.11), most=0.09),
-    ALL_BUT: people_summary(mean=(1.0, -0.5, 2.5), **FEW),
-    AVERAGE_FELT: people_summary(mean=(3.0, 1.0, 5.0), **SOME),
-    FELT: people_summary(mean=(6.0, -1.0, 9.0), **SOME),
-    DIFFERENT: people_summary(
-        mean=(12.0, 9.0, 15.0), share=(0.9, 0.8, 0.97), most=0.96, somebody=1.0
-    ),
-    INCONCLUSIVE: people_summary(mean=(0.5, -2.0, 3.0), share=(0.1, 0.02, 0.3), most=0.27),
+    EQUIVALENT: people_summary(mean=(-0.4, -1.2, 0.4)),
+    WITHIN_BOUNDS: people_summary(mean=(3.0, 1.0, 5.0)),
+    DIFFERENT: people_summary(mean=(6.0, 2.0, 9.0)),
+    INCONCLUSIVE: people_summary(mean=(4.0, -3.0, 11.0)),
 }
-# What is said of people, of the mean, and of the verdict.
+# The mean, and the interval on which the verdict rests.
 SAID = {
-    EQUIVALENT: ("equivalent in", "at most 9% of people", "−0.4", "−1.2 to +0.4"),
-    ALL_BUT: ("all but 4–16% of people", "+1.0", "−0.5 to +2.5"),
-    AVERAGE_FELT: ("on average", "about 4 in 10 people", "25–58%", "+1.0 to +5.0"),
-    FELT: ("felt by some", "about 4 in 10 people", "25–58%", "−1.0 to +9.0"),
-    DIFFERENT: ("different in", "+12.0", "about 9 in 10 people", "80–97%"),
-    INCONCLUSIVE: ("inconclusive in", "the mean lies inside the bounds", "2–30%", "15%"),
+    EQUIVALENT: ("0.4 points of 100 lower", "90% CI −1.2 to +0.4"),
+    WITHIN_BOUNDS: ("3.0 points of 100 higher", "95% CI +1.0 to +5.0"),
+    DIFFERENT: ("6.0 points of 100 higher", "95% CI +2.0 to +9.0", "open"),
+    INCONCLUSIVE: ("4.0 points of 100 higher", "95% CI −3.0 to +11.0"),
 }
 
 
@@ -100,55 +88,110 @@ def doubted(one: ClaimFound, summary: PeopleSummary) -> ClaimFound:
 def told(one: ClaimFound) -> str:
     row = overall_row(one)
     assert row is not None
-    return headline(one, row, what="magnitude")
+    return claim_in_short(one, row, what="magnitude")
+
+
+def of_people(one: ClaimFound) -> str:
+    row = overall_row(one)
+    assert row is not None
+    return do_people_differ(one, row)
 
 
 @pytest.mark.parametrize("verdict", SUMMARIES)
-def test_the_answer_is_about_people_with_their_intervals(one, responses, verdict):
+def test_the_answer_says_the_mean_with_the_interval_that_decides(one, responses, verdict):
     judged = by_model(one, SUMMARIES[verdict])
     row = overall_row(judged)
     assert row is not None
     assert row["verdict"] == verdict
     sentence = words_of(answer([judged], responses))
-    for part in (*SAID[verdict], "points of 100", "bounds −7.5 to +7.5"):
-        assert part.lower() in sentence.lower(), part
-    [first, *_] = claim_outcomes([judged])
-    assert f": {verdict}; " in first.sentence
-    assert "TOST" in first.sentence
-    assert "people feel it" not in first.sentence  # said on the first page
+    for part in (*SAID[verdict], "allowed ±7.5"):
+        assert part in sentence, part
+    first, *_ = claim_sentences(judged)
+    assert f": {verdict}; paired tests: " in first
+    assert "TOST" in first
 
 
-def test_choices_are_told_in_percentage_points(found):
-    of_choice = by_model(found[2], people_summary(mean=(0.051, 0.02, 0.08), **SOME))
-    assert "mean +5.1 percentage points (95% CI +2.0 to +8.0, bounds −10.0 to +10.0)" in told(
-        of_choice
+def test_a_difference_beyond_the_bounds_is_too_large_and_one_at_them_open(one):
+    beyond, at = (
+        told(by_model(one, people_summary(mean=mean)))
+        for mean in ((12.0, 9.0, 15.0), (8.0, 7.0, 9.0))
     )
+    assert "larger than allowed" in beyond
+    assert "open" not in beyond
+    assert "open" in at
 
 
-def test_an_open_mean_is_told_as_open(one):
-    wide = by_model(one, people_summary(mean=(4.0, -3.0, 11.0), share=(0.3, 0.04, 0.6), most=0.56))
-    assert "open whether the mean lies inside the bounds" in told(wide)
-    assert "4–60%" in told(wide)
+def test_which_textures_differ_is_told_beside_those_that_do_not(one):
+    judged = by_model(one, SUMMARIES[DIFFERENT])
+    tests = judged.tests.copy()
+    tests.loc[tests["texture"].isin(["aluminum", "canvas"]), "verdict"] = INCONCLUSIVE
+    sentence = told(replace(judged, tests=tests))
+    assert "It comes from" in sentence
+    assert "PVC (+6.0)" in sentence
+    assert "aluminum, canvas show none" in sentence
+    tests.loc[tests.index[1:], "verdict"] = INCONCLUSIVE
+    assert "No single texture" in told(replace(judged, tests=tests))
+    assert "texture" not in told(by_model(one, SUMMARIES[EQUIVALENT])).split("Do people")[0]
 
 
-def test_equality_is_withheld_with_the_reason_and_no_upper_limit_of_people(one):
+def test_equality_is_withheld_with_the_reason(one):
     withheld = doubted(one, SUMMARIES[EQUIVALENT])
     assert withheld.tests.iloc[0]["verdict"] == WITHHELD
-    for sentence in (told(withheld), claim_outcomes([withheld])[0].sentence):
+    for sentence in (told(withheld), claim_sentences(withheld)[0]):
         assert "anchors failed" in sentence
-        assert "people feel it" not in sentence
-    some = doubted(one, SUMMARIES[AVERAGE_FELT])
-    assert some.tests.iloc[0]["verdict"] == FELT
-    assert "at least 25% of people feel it" in told(some)
-    assert "anchors failed" in told(some)
-    assert "58%" not in told(some)
-    different = doubted(one, SUMMARIES[DIFFERENT])
-    assert "at least 80% of people" in told(different)
-    unclear = doubted(one, SUMMARIES[INCONCLUSIVE])
-    assert "lies inside" not in told(unclear)
-    for judged in (withheld, some, unclear):
-        [priors] = [o for o in claim_outcomes([judged]) if "priors" in o.sentence]
-        assert "at most" not in priors.sentence
+        assert "equivalent" not in sentence.replace("not called equivalent", "").replace(
+            WITHHELD, ""
+        )
+
+
+def test_nothing_is_said_of_a_posterior_that_did_not_converge(one):
+    stuck = by_model(one, replace(SUMMARIES[EQUIVALENT], converged=False))
+    assert set(stuck.tests["verdict"]) == {NOT_CONVERGED}
+    assert stuck.tests[["model_mean", "model_low", "people_sd", "p_of_model"]].isna().all(axis=None)
+    assert "CI" not in told(stuck)
+    assert "--seed" in told(stuck)
+
+
+def test_a_verdict_that_wider_priors_would_turn_says_so_at_once(one):
+    wide = people_summary(mean=(-0.6, -1.6, 7.6))
+    judged = by_model(one, SUMMARIES[EQUIVALENT], doubled=wide)
+    assert f"“{INCONCLUSIVE}”" in told(judged)
+    assert "priors" not in told(by_model(one, SUMMARIES[EQUIVALENT]))
+    table = priors_table([judged])
+    assert list(table["priors"]) == [OWN, DOUBLED]
+    assert list(table["verdict"]) == [EQUIVALENT, INCONCLUSIVE]
+    withheld = priors_table([doubted(one, SUMMARIES[EQUIVALENT])])
+    assert list(withheld["verdict"]) == [WITHHELD] * 2
+
+
+def test_the_sd_between_people_is_at_most_its_limit_where_it_may_be_none(one):
+    near = of_people(by_model(one, people_summary(sd=(2.0, 0.1, 5.4))))
+    assert "at most 5.4 points" in near
+    away = of_people(by_model(one, people_summary(sd=(4.0, 2.5, 6.1))))
+    assert "4.0 points of 100 (95% CI 2.5 to 6.1)" in away
+    days = replace(by_model(one, people_summary()), by_day=True)
+    assert "SD of people and days" in of_people(days)
+    unknown = of_people(by_model(one, people_summary(sd=(float("nan"),) * 3)))
+    assert "SD" not in unknown
+
+
+@pytest.mark.parametrize(("p", "shown"), [(0.3, "Not shown"), (0.001, "Shown")])
+def test_that_people_differ_is_said_by_the_f_test(one, p, shown):
+    judged = by_model(one, people_summary())
+    judged = replace(judged, tests=judged.tests.assign(people_p=p))
+    assert f"Do people differ? {shown} (F(15, 90)" in of_people(judged)
+
+
+def test_people_are_counted_only_where_the_design_can_tell(one, found):
+    few = replace(one, people_count=PeopleCount(repeats=2, needed=9))
+    assert "(9 are needed)" in how_many(few)
+    assert "Holm" not in how_many(few)
+    enough = replace(one, people_count=PeopleCount(repeats=9, needed=9, beyond=3, people=16))
+    assert how_many(enough).startswith("3 of 16 participants differ")
+    days = replace(one, people_count=PeopleCount(repeats=9, needed=9, by_day=True))
+    assert "days" in how_many(days)
+    assert how_many(replace(found[2], people_count=None)) == ""
+    assert of_people(found[2]) == ""  # right answers by model say nothing of single people
 
 
 def test_an_unfinished_task_shows_no_effect_whatever_the_rule(responses):
@@ -156,171 +199,117 @@ def test_an_unfinished_task_shows_no_effect_whatever_the_rule(responses):
     begun = replace(begun, answers={"absolute": responses.answers["absolute"]})
     judged = claims_found(begun, rng=np.random.default_rng(1))
     assert {one.tests.iloc[0]["verdict"] for one in judged} == {INTERIM}
-    assert all(one.people is None for one in judged)
+    assert all(one.people is None and one.people_count is None for one in judged)
     said = words_of(answer(judged, begun))
     assert said
     assert "CI" not in said
-    assert "feel it" not in said
+    assert "people" not in said
     assert people_items([one for one in judged if not one.caveats.unfinished], simulated=True) == ()
 
 
-@pytest.mark.parametrize(
-    ("share", "words"),
-    [
-        (0.001, "fewer than 1 in 100"),
-        (0.03, "about 3 in 100"),
-        (0.08, "about 1 in 10"),
-        (0.42, "about 4 in 10"),
-        (0.94, "about 9 in 10"),
-        (0.97, "nearly everybody"),
-    ],
-)
-def test_shares_are_told_as_numbers_of_people(share, words):
-    assert about(share).startswith(words)
-
-
 def test_that_tests_say_something_else_is_said_with_the_reasons(one):
-    table = people([0.0] * 16, careless=(2, 15))
-    judged = by_model(one, SUMMARIES[AVERAGE_FELT], people=table, lapses=0.12)
-    judged = replace(judged, tests=judged.tests.assign(share_at_ends=0.11, excluded="sub-04"))
-    [said] = [o for o in claim_outcomes([judged]) if "paired tests “" in o.sentence]
-    assert said.weight == Weight.OVERALL
-    tests = judged.tests.iloc[0]["tests_verdict"]
-    for part in (AVERAGE_FELT, tests, "mean alone", "sub-03, sub-16", "11%", "12%", "sub-04"):
-        assert part in said.sentence, part
+    judged = by_model(one, replace(SUMMARIES[EQUIVALENT], careless=0.12))
+    tests = judged.tests.assign(tests_verdict=DIFFERENT, share_at_ends=0.11, excluded="sub-04")
+    judged = replace(judged, tests=tests)
+    *_, said = claim_sentences(judged)
+    for part in (EQUIVALENT, DIFFERENT, "12%", "11%", "sub-04"):
+        assert part in said, part
+    agree = replace(judged, tests=judged.tests.assign(tests_verdict=EQUIVALENT))
+    assert len(claim_sentences(agree)) == 2
 
 
-@pytest.mark.parametrize("tests", [EQUIVALENT, WITHIN_BOUNDS, ""])
-def test_nothing_is_said_where_the_tests_do_not_contradict(one, tests):
-    judged = by_model(one, SUMMARIES[EQUIVALENT])
-    judged = replace(judged, tests=judged.tests.assign(tests_verdict=tests))
-    assert not any("paired tests “" in o.sentence for o in claim_outcomes([judged]))
-
-
-def test_what_doubled_priors_change_is_said(one):
-    wide = people_summary(mean=(-0.6, -1.6, 0.4), share=(0.05, 0.0, 0.2), most=0.18)
-    judged = by_model(one, SUMMARIES[EQUIVALENT], doubled=wide)
-    [said] = [o for o in claim_outcomes([judged]) if "priors" in o.sentence]
-    for part in (INCONCLUSIVE, "−0.6 instead of −0.4", "18% instead of 9%"):
-        assert part in said.sentence, part
-    table = priors_table([judged])
-    assert list(table["priors"]) == [OWN, DOUBLED]
-    assert list(table["verdict"]) == [EQUIVALENT, INCONCLUSIVE]
-    assert list(table["share_most"]) == [0.09, 0.18]
-    withheld = priors_table([doubted(one, SUMMARIES[EQUIVALENT])])
-    assert list(withheld["verdict"]) == [WITHHELD] * 2
-
-
-def test_chains_that_disagree_are_reported(one):
-    stuck = replace(SUMMARIES[EQUIVALENT], r_hat=1.31)
-    assert any("1.31" in o.sentence for o in claim_outcomes([by_model(one, stuck)]))
-    assert not any("R̂" in o.sentence for o in claim_outcomes([by_model(one, SUMMARIES[FELT])]))
-
-
-def test_textures_are_equal_on_average_or_differ_by_the_model(one):
-    same = claim_outcomes([by_model(one, SUMMARIES[EQUIVALENT])])[-1].sentence
-    assert f"{EQUAL_ON_AVERAGE}: aluminum, canvas" in same
-    assert "jointly equal on average" in same
-    assert "jointly equivalent" not in same
-    apart = claim_outcomes([by_model(one, SUMMARIES[DIFFERENT])])[-1]
-    assert apart.weight == Weight.TEXTURES
-    assert "canvas +12.0 points of 100 (95% CI +9.0 to +15.0)" in apart.sentence
-    assert "Holm" not in apart.sentence
+def test_textures_are_told_by_the_model(one):
+    same = claim_sentences(by_model(one, SUMMARIES[EQUIVALENT]))[1]
+    assert f"{EQUIVALENT}: aluminum, canvas" in same
+    assert "jointly equivalent" in same
+    apart = claim_sentences(by_model(one, SUMMARIES[DIFFERENT]))[1]
+    assert "canvas +6.0 points of 100 (95% CI +2.0 to +9.0)" in apart
+    assert "Holm" not in apart
 
 
 def test_everybody_is_in_the_table_with_their_claim(found):
-    judged = [by_model(each, SUMMARIES[FELT]) for each in found[:2]]
+    judged = [by_model(each, SUMMARIES[DIFFERENT]) for each in found[:2]]
     table = people_table([*judged, found[2]])
     assert table.groupby("claim")["participant_id"].nunique().to_dict() == {
         one.claim.name: 16 for one in judged
     }
 
 
-def test_each_claim_that_the_model_decides_has_its_picture(responses, found):
-    judged = [by_model(found[0], SUMMARIES[FELT]), *found[1:]]
+def test_each_claim_that_the_model_is_asked_about_has_its_pictures(responses, found):
+    judged = [by_model(found[0], SUMMARIES[DIFFERENT]), *found[1:]]
     (with_model,) = sections(answered_of(responses, found=judged))
     (without,) = sections(answered_of(responses, found=found))
-    names = {getattr(item, "name", "") for item in with_model.items}
-    assert {file_stem(f"people_{found[0].claim.name}"), "people_priors"} <= names
+    inside = {i.name for item in with_model.items if isinstance(item, Fold) for i in item.items}
+    stem = file_stem(found[0].claim.name)
+    assert {f"people_{stem}", f"predictive_{stem}", "people"} <= inside
     assert not any(str(getattr(item, "name", "")).startswith("people") for item in without.items)
 
 
+def test_the_chapter_is_a_table_of_one_row_per_claim(responses, found):
+    judged = [by_model(found[0], SUMMARIES[DIFFERENT]), *found[1:]]
+    (section,) = sections(answered_of(responses, found=judged))
+    assert section.findings == ()
+    table = section.opening.frame.set_index("claim")
+    assert list(table.index) == [one.claim.name for one in found]
+    row = table.iloc[0]
+    assert (row["verdict"], row["difference"], row["rule"]) == (DIFFERENT, 6.0, MODEL_RULE)
+    assert row["beside"] == found[0].tests.iloc[0]["verdict"]
+    assert table["rule"].iloc[1:].tolist() == ["tests", "tests"]
+    assert np.isnan(table["people_p"].iloc[2])  # of right answers
+
+
 def test_the_model_is_reported_as_in_a_paper(responses, found):
-    judged = [by_model(found[0], SUMMARIES[FELT]), by_model(found[2], SUMMARIES[EQUIVALENT])]
+    judged = [by_model(found[0], SUMMARIES[DIFFERENT])]
     text = methods_paragraph(responses, judged)
     ratings, effort = RatingPriors(), Effort()
-    assert f"scale {ratings.effects.spread:g}" in text
+    assert f"an SD half-normal (scale {ratings.people_sd:g})" in text
     assert f"{effort.chains} chains of {effort.steps} steps after {effort.warm_up}" in text
-    assert f"({DOUBLED_CHAINS} chains)" in text
-    assert f"below {responses.plan.few:.0%}" in text
-    for one in judged:
-        assert f"“{one.claim.name}”" in text
-    assert "forced choice of 7 alternatives" in text
+    assert f"“{found[0].claim.name}”" in text
     assert "decide the other" not in text
-    assert "decide the other claim." in methods_paragraph(responses, [*judged, found[1]])
+    assert "decide the other claims." in methods_paragraph(responses, [*judged, *found[1:]])
     assert "hierarchical" not in methods_paragraph(responses, found)
-
-
-def test_priors_of_the_odd_one_out_are_its_own(responses, found, choices):
-    oddity = replace(found[2], claim=replace(found[2].claim, task="oddity", name="odd"))
-    odd = choices.assign(layout="full|simplified|full")
-    answers = replace(responses, answers={"oddity": odd})
-    text = methods_paragraph(answers, [by_model(oddity, SUMMARIES[EQUIVALENT])])
-    priors = ChoicePriors.of(ODDITY)
-    assert f"means normal (0, {priors.effects.mean_sd:g})" in text
-    assert f"beta({priors.catch[0]:g}, {priors.catch[1]:g})" in text
-
-
-def values_of(row: str, *, cell: int) -> list[float]:
-    """Numbers in a cell of a row of the page's table."""
-    return [float(one) for one in row.split("|")[cell].replace("−", "-").split(",") if one.strip()]
-
-
-def priors_by_name(priors: RatingPriors | ChoicePriors) -> dict[str, list[float]]:
-    """Every number of the priors, by the name that the page gives it."""
-    own = {f"effects.{name}": value for name, value in vars(priors.effects).items()}
-    own |= {name: value for name, value in vars(priors).items() if name != "effects"}
-    return {name: list(np.atleast_1d(value)) for name, value in own.items()}
+    beside = methods_paragraph(responses, [by_model(found[0], people_summary(), decides=False)])
+    assert "hierarchical" in beside
+    assert "verdicts on" not in beside.lower()
 
 
 def test_the_page_on_the_model_states_the_priors_that_are_used():
     text = (ROOT / "docs/method/participants.md").read_text(encoding="utf-8")
     rows = [line for line in text.splitlines() if line.startswith("| `")]
-    split = next(k for k, row in enumerate(rows) if k and "effects.mean_sd" in row)
-    of_choices = [ChoicePriors.of(model) for model in (forced_choice(7), ODDITY)]
-    tables = [(rows[:split], RatingPriors(), 2)]
-    tables += [(rows[split:], priors, cell) for cell, priors in enumerate(of_choices, start=2)]
-    for own, priors, cell in tables:
-        known = priors_by_name(priors)
-        stated = {row.split("`")[1]: values_of(row, cell=cell) for row in own}
-        assert set(stated) == set(known)
-        for name, values in stated.items():
-            assert values in ([], known[name]), name
-        assert sum(map(bool, stated.values())) >= 7
+    stated = {
+        row.split("`")[1]: [float(one) for one in row.split("|")[2].replace("−", "-").split(",")]
+        for row in rows
+    }
+    assert stated == {name: list(np.atleast_1d(v)) for name, v in vars(RatingPriors()).items()}
 
 
-def test_claims_that_tests_decide_in_spite_of_the_plan_are_named(responses, found):
-    judged = [by_model(found[0], SUMMARIES[FELT]), *found[1:]]
-    [sentence] = decided_by_tests(responses, judged)
-    assert found[0].claim.name not in sentence
-    assert found[1].claim.name in sentence
-    assert sentence in deviations(responses, judged)
+def test_claims_that_tests_decide_in_spite_of_the_plan_are_named_with_the_reason(responses, found):
+    judged = [by_model(found[0], people_summary(), decides=False), *found[1:]]
+    uneven, few = decided_by_tests(responses, judged)
+    assert found[0].claim.name in uneven
+    assert "began" in uneven
+    assert found[1].claim.name in few
+    assert {uneven, few} <= set(deviations(responses, judged))
     by_tests = replace(responses, plan=replace(responses.plan, rule="tests"))
-    assert sentence not in deviations(by_tests, judged)
+    assert decided_by_tests(by_tests, judged) == []
+    old = replace(responses, plan=replace(responses.plan, rule=WITHDRAWN))
+    (why,) = decided_by_tests(old, judged)
+    assert "not printed" in why
 
 
-def test_a_report_by_the_model_says_what_feeling_it_means(
-    tmp_path, responses, anchors, monkeypatch, undrawn
-):
+def test_a_report_by_the_model_is_whole(tmp_path, responses, anchors, monkeypatch, undrawn):
     """The whole way, with short chains: eight people, of whom none feels a difference."""
     short = Effort(chains=2, warm_up=20, steps=40, every=4)
-    monkeypatch.setattr("tactileq.analysis.statistics.participants.verdict.Effort", lambda: short)
+    where = "tactileq.analysis.statistics.participants.posterior"
+    monkeypatch.setattr(f"{where}.Effort", lambda: short)
+    monkeypatch.setattr(f"{where}.LONGER", short)
     few = rating_table(np.random.default_rng(3), people=8).assign(session=1)
     few["trial"] = few.groupby("participant_id").cumcount() + 1
     of_few = anchors["absolute"].assign(session=1, trial=99)
     of_few = of_few[of_few["participant_id"].isin(few["participant_id"])]
     small = replace(responses, answers={"absolute": few}, anchors={"absolute": of_few})
     html = write_report(tmp_path / "report.html", responses=small).read_text(encoding="utf-8")
-    assert FEEL_IT.replace("'", "&#x27;") in html
+    # So few draws tell nothing, and that is what is said.
+    assert NOT_CONVERGED in html
     tables = {path.stem for path in (tmp_path / "tables").iterdir()}
-    assert {"people", "people_priors", "claims"} <= tables
+    assert {"people", "people_priors", "claims", "claims_in_short"} <= tables

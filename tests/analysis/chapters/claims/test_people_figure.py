@@ -13,26 +13,25 @@ from matplotlib.figure import Figure
 
 from tactileq.analysis.chapters.claims.forest import BESIDE, MARKS, figure_forest, plot_forest
 from tactileq.analysis.chapters.claims.people_figure import (
+    ATTENDING,
     CARELESS,
-    INSIDE,
-    OUTSIDE,
     figure_people,
     plot_people,
 )
+from tactileq.analysis.chapters.claims.predictive_figure import figure_predictive
 from tactileq.analysis.statistics.caveats import EQUALITY
-from tactileq.analysis.statistics.equivalence import EQUAL_ON_AVERAGE, FELT
+from tactileq.analysis.statistics.equivalence import DIFFERENT, INCONCLUSIVE
 from tactileq.analysis.statistics.verdicts import ClaimFound
 from tests.analysis.conftest import by_model, people_summary, people_table
 
-SUMMARY = people_summary(mean=(5.0, -1.0, 9.0), share=(0.42, 0.25, 0.58), most=0.55, somebody=1.0)
+SUMMARY = people_summary(mean=(5.0, -1.0, 9.0), sd=(4.0, 2.5, 6.1))
 EFFECTS = [3.0, -2.0, 15.0, 1.0, 12.0, 0.5, -1.0, 2.0]
 
 
 @pytest.fixture(scope="module")
 def judged(found) -> ClaimFound:
-    """Two of eight people outside the bounds, and one careless."""
-    table = people_table(EFFECTS, outside=(2, 4), careless=(0,))
-    return by_model(found[0], SUMMARY, people=table)
+    """Eight people, of whom one is careless."""
+    return by_model(found[0], SUMMARY, people=people_table(EFFECTS, careless=(0,)))
 
 
 def drawn(ax: Axes, mark: str) -> list[tuple[float, float]]:
@@ -46,22 +45,23 @@ def legend_of(figure: Figure) -> list[str]:
 
 def test_people_stand_in_the_order_of_their_effects(judged):
     ax = plot_people(judged, simulated=True)
-    inside, outside, careless = (drawn(ax, kind[0]) for kind in (INSIDE, OUTSIDE, CARELESS))
-    assert sorted(inside + outside + careless) == [
+    attending, careless = (drawn(ax, kind[0]) for kind in (ATTENDING, CARELESS))
+    assert sorted(attending + careless) == [
         (float(place), effect) for place, effect in enumerate(sorted(EFFECTS))
     ]
-    assert [effect for _, effect in outside] == [12.0, 15.0]
     assert [effect for _, effect in careless] == [3.0]
-    assert len({to_hex(kind[1]) for kind in (INSIDE, OUTSIDE, CARELESS)}) == 3
+    assert to_hex(ATTENDING[1]) != to_hex(CARELESS[1])
 
 
-def test_share_bounds_and_careless_people_are_written_into_the_figure(judged):
+def test_sd_bounds_and_careless_people_are_written_into_the_figure(judged):
     figure = figure_people(judged, simulated=True)
     [ax] = figure.axes
     title = ax.get_title(loc="left")
     assert judged.claim.name in title
-    assert FELT in title
-    assert "42% (95% CI 25% to 58%)" in title
+    assert INCONCLUSIVE in title
+    assert "4.0 (95% CI 2.5 to 6.1)" in title
+    days = plot_people(replace(judged, by_day=True), simulated=True).get_title(loc="left")
+    assert "people and days" in days
     assert any("sub-01" in label for label in legend_of(figure))
     assert "SIMULATED" in [text.get_text() for text in ax.texts]
     assert "points of 100" in ax.get_ylabel()
@@ -71,19 +71,20 @@ def test_share_bounds_and_careless_people_are_written_into_the_figure(judged):
     )
 
 
-def test_no_upper_limit_of_people_is_drawn_where_there_is_doubt(judged):
-    doubted = replace(judged, tests=judged.tests.assign(doubt="anchors failed"))
-    title = plot_people(doubted, simulated=True).get_title(loc="left")
-    assert "25%" in title
-    assert "58%" not in title
-
-
-def test_choices_are_drawn_in_percentage_points(found):
-    table = people_table([0.2] * 8)
-    ax = plot_people(by_model(found[2], SUMMARY, people=table), simulated=False)
-    assert "percentage points" in ax.get_ylabel()
-    assert [effect for _, effect in drawn(ax, INSIDE[0])] == pytest.approx([20.0] * 8)
-    assert not ax.texts
+def test_the_check_shows_what_was_given_among_what_is_predicted(judged):
+    people = judged.people
+    figure = figure_predictive(judged, simulated=True)
+    ends, spread, repeats = figure.axes
+    for ax, given in ((ends, 100 * people.given.at_ends[0]), (repeats, people.given.repeated[0])):
+        [line] = [one for one in ax.lines if one.get_color() == "black" or one.get_lw() == 2]
+        assert float(line.get_xdata()[0]) == pytest.approx(given)
+    total = sum(bar.get_height() for bar in ends.patches)
+    assert total == len(people.replicated.at_ends)
+    [dots] = [one for one in spread.lines if one.get_marker() == "o"]
+    np.testing.assert_allclose(dots.get_ydata(), np.sort(people.given.spread[0]))
+    once = replace(people.given, repeated=np.array([np.nan]))
+    single = replace(judged, people=replace(people, given=once))
+    assert len(figure_predictive(single, simulated=False).axes) == 2
 
 
 @pytest.mark.parametrize("people", [8, 36, 100])
@@ -101,8 +102,7 @@ def test_any_number_of_people_fits(found, people):
 
 def test_the_forest_shows_the_mean_that_the_verdict_rests_on(judged):
     ax = plot_forest(judged, simulated=True, ax=Figure().subplots())
-    [(x, y)] = drawn(ax, MARKS[FELT][0])
-    assert (x, y) == (SUMMARY.mean, 0.0)
+    assert (SUMMARY.mean, 0.0) in drawn(ax, MARKS[INCONCLUSIVE][0])
     intervals = {
         tuple(map(float, line.get_xdata())): float(line.get_ydata()[0])
         for line in ax.lines
@@ -114,9 +114,9 @@ def test_the_forest_shows_the_mean_that_the_verdict_rests_on(judged):
 
 
 def test_every_word_of_equality_has_a_look_of_its_own(found, judged):
-    words = (*EQUALITY, FELT)
+    words = (*EQUALITY, DIFFERENT, INCONCLUSIVE)
     assert len({MARKS[word][0] for word in words}) == len(words)
     same = by_model(found[1], people_summary())
     legend = legend_of(figure_forest([judged, same, found[2]], simulated=True))
-    assert {FELT, EQUAL_ON_AVERAGE, "95% CI of the model"} <= set(legend)
+    assert {INCONCLUSIVE, "equivalent", "95% CI of the model"} <= set(legend)
     assert "95% CI of the model" not in legend_of(figure_forest(found, simulated=True))
