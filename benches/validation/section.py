@@ -20,13 +20,13 @@ NOTE = (
 
 
 MODEL_NOTE = (
-    "Each row: studies drawn by generators that share no code with the model of the participants "
-    "and were not made for it; those that were held out were first run after the rule had been "
-    "committed. Shares of studies: the mean effect among people who attend covered by its 95% "
-    "interval; the share of people outside the bounds below its 95% limit; the mean said to be "
-    "inside the bounds, by the model and by TOST; verdicts as the report says them, without words "
-    "of equality where sensitivity was not shown (the share of ratings at the ends is not looked "
-    "at). Last column: what the row was to reach and missed by more than two standard errors."
+    "Each row: studies drawn by generators that share no code with the model of the participants; "
+    "for those with a commit the rule was fixed before they were written. Shares of studies: the "
+    "mean effect among people who attend, and the SD between people, covered by their 95% "
+    "intervals; the mean called equal or different; a texture without an effect called different, "
+    "or one at a bound equal; each beside paired t-test and TOST, apart from days (AB/BA). Verdicts "
+    "of a sampler that did not converge are withheld. Last column: aims that do not lie in the 99% "
+    "interval of the row."
 )
 RANK_NOTE = (
     "Studies whose parameters were drawn from the priors: how many of the drawn values lay in each "
@@ -45,9 +45,9 @@ def validation_section(table: pd.DataFrame, of_model: pd.DataFrame, ranks: pd.Da
     table : DataFrame
         From `tactileq.benches.validation.procedures.validation_table`.
     of_model : DataFrame
-        From `validation_model.model_table`.
+        From `tactileq.benches.validation.model.model_table`.
     ranks : DataFrame
-        From `validation_ranks.rank_table`.
+        From `tactileq.benches.validation.ranks.rank_table`.
     """
     apart = table[table["within"] == "no"]
     short = (
@@ -70,7 +70,7 @@ def validation_section(table: pd.DataFrame, of_model: pd.DataFrame, ranks: pd.Da
     )
     model = Table(
         "validation_model",
-        "Verdicts of the model of the participants on planted truth",
+        "The rule of verdicts on planted truth",
         MODEL_NOTE,
         of_model,
         MODEL_COLUMNS,
@@ -78,7 +78,7 @@ def validation_section(table: pd.DataFrame, of_model: pd.DataFrame, ranks: pd.Da
     )
     calibration = Table(
         "validation_ranks",
-        "Calibration of the samplers: ranks of drawn values",
+        "Calibration of the sampler: ranks of drawn values",
         RANK_NOTE,
         ranks,
         RANK_COLUMNS,
@@ -93,7 +93,7 @@ def validation_section(table: pd.DataFrame, of_model: pd.DataFrame, ranks: pd.Da
         (summary, Fold("All procedures in all situations", (whole,)), model, calibration),
         done=(
             f"Procedures were tested on planted truth ({most} simulations per row): {held} of "
-            f"{len(table)} rows contain their nominal value; verdicts of the model of the "
-            f"participants miss an aim in {missed} of {len(of_model)} rows (appendix).",
+            f"{len(table)} rows contain their nominal value; the rule of verdicts misses an aim in "
+            f"{missed} of {len(of_model)} rows (appendix).",
         ),
     )

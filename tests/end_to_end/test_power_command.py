@@ -110,9 +110,9 @@ def test_the_report_gets_the_appendix(main, place: Path, monkeypatch: pytest.Mon
 
     few = validation.cells(["TOST, guard on ends"], sizes=[8])
     monkeypatch.setattr(validation, "cells", lambda: few)
-    of_model = [("ratings: split ± 10", 8), ("oddity: nobody feels it", 8)]
+    of_model = [("none, SD 2", 8), ("choices, days .25", 8)]
     monkeypatch.setattr(validation_model, "model_cells", lambda: of_model)
-    ranks = {"odd one out": validation_ranks.RANK_KINDS["odd one out"]}
+    ranks = {"two repeats": validation_ranks.RANK_KINDS["two repeats"]}
     monkeypatch.setattr(validation_ranks, "RANK_KINDS", ranks)
     monkeypatch.setattr(validation_ranks, "STEPS", 100)
     assert main("simulate", "--study", "study.toml", "--data", "data").returncode == 0
@@ -122,8 +122,8 @@ def test_the_report_gets_the_appendix(main, place: Path, monkeypatch: pytest.Mon
     assert len(table) == len(few)
     assert set(table["simulations"]) == {4}
     table = pd.read_csv(place / "analysis-results/tables/validation_model.tsv", sep="\t")
-    assert list(table["situation"]) == [name for name, _ in of_model]
-    assert (table["equality"] + table["different"] + table["inconclusive"] <= 1).all()
+    assert list(table["world"]) == [name for name, _ in of_model]
+    assert list(table["rule"]) == ["hierarchical", "tests"]
     table = pd.read_csv(place / "analysis-results/tables/validation_ranks.tsv", sep="\t")
     assert {sum(map(int, ranks.split())) for ranks in table["ranks"]} == {4}
     page = (place / "analysis-results/report.html").read_text()

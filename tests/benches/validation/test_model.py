@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 from statsmodels.stats.multitest import multipletests
@@ -137,12 +137,12 @@ def test_words_by_tests_are_those_of_scipy(name: str, n: int, short: None):
 def test_textures_are_a_family_corrected_after_holm(short: None):
     """Of the six textures without an effect, whether any is called different."""
     name, n = "one texture", 8
-    row = simulate_model_cell((name, n), simulations=50, seed=3)
-    values = WORLDS[name](generator(3, number_of(name), n, 0), (50, n)).values.mean(axis=-1)
+    row = simulate_model_cell((name, n), simulations=25, seed=1)
+    values = WORLDS[name](generator(1, number_of(name), n, 0), (25, n)).values.mean(axis=-1)
     p = stats.ttest_1samp(values[..., 1] - values[..., 0], 0.0, axis=1).pvalue
     wrong = [multipletests(one, method="holm")[0][[0, 1, 2, 4, 5, 6]].any() for one in p]
     assert row["tests_texture_different"] == pytest.approx(np.mean(wrong))
-    assert 0 < sum(wrong) < 25
+    assert 0 < sum(wrong) < 12
     assert np.isnan(row["texture_equal"])  # nothing is planted at a bound
 
 
@@ -213,6 +213,7 @@ def test_aims_are_those_of_what_is_planted(row: dict, asked: dict):
     assert "coverage" not in {one for one, *_ in aims({**row, "coverage": np.nan})}
 
 
+@settings(max_examples=20)
 @given(st.integers(0, 1000), st.integers(0, 1000), st.sampled_from([ROW, AT_BOUND, TWICE]))
 def test_an_aim_is_missed_where_the_99_percent_interval_of_the_count_lies_beside_it(
     first: int, second: int, row: dict
