@@ -107,7 +107,7 @@ def claim_values(responses: Responses, claim: Claim) -> Values:
     return Values(
         table=complete_means(answers, claim.measure, models=claim.models, repeats=repeats),
         share_at_ends=claim_shares(responses, claim),
-        contrasts=day_contrasts(answers, claim.models),
+        contrasts=day_contrasts(responses.answers[claim.task], claim.models),
     )
 
 

@@ -23,7 +23,8 @@ def day_contrasts(answers: pd.DataFrame, models: tuple[str, str]) -> pd.DataFram
     Parameters
     ----------
     answers : DataFrame
-        participant_id, session and model; a row for each answer.
+        participant_id, session and model; a row for each answer of the task, also with models that
+        are not compared, whose days lie between the others.
     models : (str, str)
         The reference first.
 
@@ -36,8 +37,7 @@ def day_contrasts(answers: pd.DataFrame, models: tuple[str, str]) -> pd.DataFram
     """
     if "session" not in answers:
         return pd.DataFrame(index=answers["participant_id"].unique())
-    held = answers[answers["model"].isin(models)][["participant_id", "session", "model"]]
-    held = held.drop_duplicates()
+    held = answers[["participant_id", "session", "model"]].drop_duplicates()
     days = held.assign(day=held.groupby("participant_id")["session"].rank("dense"))
     counts = pd.crosstab(days["participant_id"], [days["model"], days["day"]]).astype(float)
     if not set(models) <= set(counts.columns.get_level_values(0)):

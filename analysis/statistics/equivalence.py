@@ -103,7 +103,8 @@ def one_sided_tests(
     found = differences
     if not isinstance(found, MeanDifferences):
         found = mean_differences(found)
-    t_low, t_high = ((found.mean - bound) / found.error for bound in bounds)
+    with np.errstate(divide="ignore", invalid="ignore"):  # where nobody varies
+        t_low, t_high = ((found.mean - bound) / found.error for bound in bounds)
     return t_low, stats.t.sf(t_low, found.df), t_high, stats.t.cdf(t_high, found.df)
 
 

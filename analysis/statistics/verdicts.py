@@ -204,7 +204,8 @@ def people_data(responses: Responses, claim: Claim) -> PeopleData | None:
     checks = checks[checks["participant_id"].isin(people)]
     if len(people) < FEWEST:
         return None
-    even = balanced(day_contrasts(answers, claim.models))
+    contrasts = day_contrasts(responses.answers[claim.task], claim.models)
+    even = balanced(contrasts[contrasts.index.isin(people)])
     return PeopleData(
         studies=rating_studies(answers, checks, claim.measure, models=claim.models, people=people),
         people=people,
@@ -242,7 +243,7 @@ def _people_count(responses: Responses, claim: Claim) -> PeopleCount | None:
         beyond, of = counted_people(p) if repeats >= needed else (0, 0)
         return PeopleCount(repeats=repeats, needed=needed, beyond=beyond, people=of)
     needed = repeats_for_ratings(claim.bounds, rating_sd=RatingPriors().rating_sd, **size)
-    by_day = bool(day_contrasts(answers, claim.models).shape[1])
+    by_day = bool(day_contrasts(responses.answers[claim.task], claim.models).shape[1])
     beyond, of = 0, 0
     if repeats >= needed and not by_day:
         nobody = answers[:0]

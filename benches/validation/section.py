@@ -23,8 +23,8 @@ MODEL_NOTE = (
     "Each row: studies drawn by generators that share no code with the model of the participants; "
     "for those with a commit the rule was fixed before they were written. Shares of studies: the "
     "mean effect among people who attend, and the SD between people, covered by their 95% "
-    "intervals; the mean called equal or different; a texture without an effect called different, "
-    "or one at a bound equal; each beside paired t-test and TOST, apart from days (AB/BA). Verdicts "
+    "intervals; the mean called equal or different; a texture without effect called different, "
+    "or one at a bound equal; each beside paired t-test and TOST, apart from days. Verdicts "
     "of a sampler that did not converge are withheld. Last column: aims that do not lie in the 99% "
     "interval of the row."
 )

@@ -63,6 +63,7 @@ class RatingSampler:
         self.population = NormalPopulation(priors.mean_sd, priors.people_sd, b, rng=rng)
         self._interaction = GridSd(priors.interaction_sd, b, rng=rng)
         self._given_count = _summed(self._main.counts, keep=3)
+        self._given = self._main.of_people + self._anchors.of_people
         # Of a single rating nothing tells it from the scatter of a person's ratings.
         twice = self._main.counts.sum(axis=-1) > 1
         self._interaction.hold(~twice.any(axis=(1, 2, 3)))
@@ -145,38 +146,73 @@ class RatingSampler:
         return felt
 
     def _draw_classes(self) -> None:
-        """Who attends, which trials lapsed, and the latent judgements beyond the ends."""
+        """Who attends, which trials lapsed, and the latent judgements beyond the ends.
+
+        What a person rates a texture at stays as it is, whether the texture or their own deviation
+        takes them there: deviations that made up for a texture would keep them attending.
+        """
+        texture = self._texture[:, None]
+        self._cell = self._cell + self.attends[..., None] * texture
         own = self._own()
-        sd = np.sqrt(self._variance)[..., None, None, None]
-        proposed = self._propose_effects(own)
-        felt = self._felt()
-        attending = self._main.likelihoods(own + felt, sd)
-        careless = self._main.likelihoods(own, sd)
-        sd_own = np.sqrt(self._variance)[..., None]
-        sd_anchor = np.sqrt(self._variance + self._anchor_variance[:, None])[..., None]
+        of_attending, of_careless, log = self._propose_variances(own)
+        log -= self._propose_effects(own, of_attending)
+        effects = _HALVES * self._on_textures()[..., None, None]
+        each = (..., None, None, None)
+        attending = self._main.likelihoods(own + effects, np.sqrt(of_attending)[each])
+        careless = self._main.likelihoods(own, np.sqrt(of_careless)[each])
+        sd_anchor = np.sqrt(of_attending + self._anchor_variance[:, None])[..., None]
         level = self._person[..., None]
         expected = level + self._anchor[:, None]
         anchors = (
             self._anchors.likelihoods(expected, sd_anchor),
-            self._anchors.likelihoods(level, sd_own),
+            self._anchors.likelihoods(level, np.sqrt(of_careless)[..., None]),
         )
         lapses = self.lapses[:, None, None]
-        log = (np.log1p(-self.careless) - np.log(self.careless))[:, None] - proposed
-        log = log + self._main.log_ratio(attending, careless, self.lapses)
-        log += self._anchors.log_ratio(*anchors, self.lapses) + self._log_prior_ratio()
+        log += (np.log1p(-self.careless) - np.log(self.careless))[:, None]
+        log += self._main.log_ratio(attending, careless, self.lapses)
+        log += self._anchors.log_ratio(*anchors, self.lapses)
+        made_up = self._cell**2 - (self._cell - texture) ** 2
+        log += 0.5 * made_up.sum(axis=2) / self._cell_variance[:, None]
         self.attends = self._rng.random(log.shape) < 1 / (1 + np.exp(-np.clip(log, -500, 500)))
-        chosen = np.where(self.attends[..., None, None, None], attending, careless)
+        self._variance = np.where(self.attends, of_attending, of_careless)
+        sd = np.sqrt(self._variance)[each]
+        sd_own = np.sqrt(of_careless)[..., None]
+        chosen = np.where(self.attends[each], attending, careless)
         self._main.draw_lapses(chosen, lapses[..., None, None], self._rng)
         shown = self.attends[..., None]
         self._anchors.draw_lapses(np.where(shown, *anchors), lapses, self._rng)
-        middle = own + self.attends[..., None, None, None] * felt
+        self._cell = self._cell - self.attends[..., None] * texture
+        middle = own + self.attends[..., None, None, None] * effects
         self._main.draw_latent(middle, sd, self._rng)
         # From here on what is left of the latent judgements is kept up to date by every step.
         self._rest = self._main.latent - middle
         middle = np.where(shown, expected, level)
         self._anchors.draw_latent(middle, np.where(shown, sd_anchor, sd_own), self._rng)
 
-    def _propose_effects(self, own: Floats) -> Floats:
+    def _propose_variances(self, own: Floats) -> tuple[Floats, Floats, Floats]:
+        """(B, n) variances of each person's ratings if they attend, and if they do not.
+
+        One of them is the present one. The other is drawn: of who would attend from its prior, of
+        who would not from what their ratings say if none lapsed; third, the log of the latter's
+        density to its prior.
+        """
+        half, scale = self._priors.rating_df / 2, self._priors.careless_scale
+        given = _summed(self._main.answered * (self._main.given - own) ** 2, keep=2)
+        away = self._anchors.given - self._person[..., None]
+        given += (self._anchors.answered * away**2).sum(axis=2)
+        shape, rate = 1 + self._given / 2, scale + given / 2
+        prior = half * self._typical[:, None] / self._gamma(np.full(rate.shape, half))
+        of_attending = np.where(self.attends, self._variance, np.maximum(prior, 1e-4))
+        drawn = np.maximum(rate / self._gamma(shape), 1e-4)
+        of_careless = np.where(self.attends, drawn, self._variance)
+        log = shape * np.log(rate) - gammaln(shape) - np.log(scale)
+        log -= (shape - 1) * np.log(of_careless) + (rate - scale) / of_careless
+        return of_attending, of_careless, log
+
+    def _gamma(self, shape: Floats) -> Floats:
+        return np.maximum(self._rng.standard_gamma(shape), _TINY)
+
+    def _propose_effects(self, own: Floats, variances: Floats) -> Floats:
         """What careless people's effects would be, did they attend; (B, n) log density to prior.
 
         Pseudo-priors of Carlin and Chib (1995): effects of people who do not attend are in no
@@ -184,11 +220,9 @@ class RatingSampler:
         is careless in one step stayed so. They are drawn as if these people attended, and the
         ratio of that density to the prior's is taken back where classes are drawn.
         """
-        precision = 0.25 * self._given_count / self._variance[..., None]
-        left = self._main.answered * (
-            self._main.given - own - self._texture[:, None, :, None, None]
-        )
-        total = _other_less_reference(left) / self._variance[..., None]
+        precision = 0.25 * self._given_count / variances[..., None]
+        left = self._main.answered * (self._main.given - own)
+        total = _other_less_reference(left) / variances[..., None]
         variance, textures = (
             self._interaction.now[:, None, None] ** 2,
             self.texture_effects[:, None],
@@ -209,15 +243,6 @@ class RatingSampler:
         log = (away / variance + np.log(grown)).sum(axis=2) + np.log(known / prior)
         log += prior * (self.effects - mean) ** 2 - known * (self.effects - middle) ** 2
         found: Floats = 0.5 * log
-        return found
-
-    def _log_prior_ratio(self) -> Floats:
-        """Log density of each person's variance if they attend, over that if they do not."""
-        half, scale = self._priors.rating_df / 2, self._priors.careless_scale
-        spread = half * self._typical[:, None]
-        log = np.log(self._variance)
-        attends = half * np.log(spread) - gammaln(half) - (half + 1) * log - spread / self._variance
-        found: Floats = attends - (np.log(scale) - 2 * log - scale / self._variance)
         return found
 
     def _draw_effects(self) -> None:
@@ -350,8 +375,7 @@ class RatingSampler:
         half = self._priors.rating_df / 2
         shape = np.where(self.attends, half, 1.0) + count / 2
         scale = np.where(self.attends, half * self._typical[:, None], self._priors.careless_scale)
-        gammas = np.maximum(self._rng.standard_gamma(shape), _TINY)
-        self._variance = np.maximum((scale + squares / 2) / gammas, 1e-4)
+        self._variance = np.maximum((scale + squares / 2) / self._gamma(shape), 1e-4)
         who = self.attends & self.people
         shape = 2.0 + half * who.sum(axis=1)
         rate = 2.0 / self._priors.rating_sd**2 + half * np.where(who, 1 / self._variance, 0.0).sum(
@@ -374,7 +398,7 @@ class RatingSampler:
 
     def _inverse_gamma(self, typical: float, count: Floats, squares: Floats) -> Floats:
         """Variances whose prior is inverse gamma of shape 2 and mean typical²."""
-        gammas = np.maximum(self._rng.standard_gamma(2.0 + count / 2), _TINY)
+        gammas = self._gamma(2.0 + count / 2)
         found: Floats = np.maximum((typical**2 + squares / 2) / gammas, 1e-4)
         return found
 

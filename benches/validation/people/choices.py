@@ -51,7 +51,7 @@ class _Choices:
         # The strongest of six other percepts.
         others = rng.standard_normal((N_TEXTURES - 1, *cells)).max(axis=0)
         right = own > others
-        taken = np.array([0.0, self.lost])[:, None] / right.mean()
+        taken = np.array([0.0, self.lost])[:, None] / right.mean(axis=(0, 1, 3, 4))[:, None, None]
         right &= rng.random(cells) >= taken
         orders = shuffled(rng, (*shape, 2, N_TEXTURES * REPEATS)) / (N_TEXTURES * REPEATS - 1)
         orders = orders.reshape(*shape, 2, N_TEXTURES, REPEATS).swapaxes(2, 3)

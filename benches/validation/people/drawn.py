@@ -27,7 +27,7 @@ class DrawnStudies:
     days : (n, 7, 2, R) or (k, n, 7, 2, R) ndarray of int
         Session of each trial, 0 or 1.
     orders : (k, n, 7, 2, R) ndarray
-        Position of each trial within its session, 0 (first) … 1 (last).
+        Position of each trial among those of a session, 0 (first) … 1 (last).
     anchors : (k, n, A) ndarray
         Ratings of anchors; A = 0 without any.
     planted : (7,) ndarray

@@ -101,7 +101,7 @@ class _Ratings:
         cells = (*shape, N_TEXTURES, 2, self.repeats)
         own = N_TEXTURES * 2 * self.repeats
         trials = own + ANCHORS
-        orders = shuffled(rng, (*shape, trials)) / (trials - 1)
+        orders = shuffled(rng, (*shape, trials)) / (trials - 1)  # of both days together
         days = np.zeros((shape[1], 2), dtype=np.intp)
         if self.first >= 0:
             days = on_days(shape[1], first=self.first)

@@ -285,3 +285,18 @@ def test_limits_of_d_z_cover_what_is_planted_beside_a_day() -> None:
     tested = paired_test(np.zeros(20), d[0], rng=rng(), contrasts=contrasts)
     assert_allclose([tested.d_z_low, tested.d_z_high], limits[0])
     assert tested.d_z == pytest.approx(found.mean[0] / (found.error[0] * np.sqrt(found.size)))
+
+
+def test_three_models_in_a_latin_square_have_three_days() -> None:
+    """The third model is not compared, and yet its day lies between those of the others."""
+    names = (*MODELS, "best")
+    orders = [names[k:] + names[:k] for k in range(3)] * 4
+    sessions = {f"p{k:02}": list(enumerate(order, 1)) for k, order in enumerate(orders)}
+    contrasts = day_contrasts(answers(sessions), MODELS)
+    assert contrasts.shape == (12, 2)
+    assert balanced(contrasts)
+    added = np.array([0.0, 6.0, 9.0])
+    first, second = ([added[order.index(name)] for order in orders] for name in MODELS)
+    differences = np.subtract(second, first)
+    found = mean_differences(differences[None], contrasts.to_numpy())
+    assert_allclose(found.mean, 0.0, atol=1e-9)

@@ -304,6 +304,15 @@ def test_replicated_ratings_are_on_the_scale_where_something_was_rated():
         assert (rated == HIGHEST).any()
 
 
+def test_lapsed_trials_are_replicated_anywhere_on_the_scale():
+    rng = np.random.default_rng(18)
+    sampler = RatingSampler(ratings(rng, np.zeros(40)), RatingPriors(), rng=rng)
+    sampler.lapses = np.ones(1)
+    again = sampler.replicated()
+    inside = again[(again > LOWEST) & (again < HIGHEST)]
+    assert stats.kstest(inside, stats.uniform(LOWEST, HIGHEST - LOWEST).cdf).pvalue > 1e-3
+
+
 def test_ratings_that_follow_the_model_look_like_their_replications():
     rng = np.random.default_rng(16)
     study = ratings(rng, rng.normal(3.0, 4.0, 24), base=88.0, repeats=3)
