@@ -5,6 +5,8 @@ docs/method/participants.md#sampler
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.special import gammaln, ndtr, ndtri
 
@@ -24,6 +26,7 @@ from tactileq.modeling.participants.ratings import (
 _NORMAL = 1 / np.sqrt(2 * np.pi)
 _HALVES = np.array([-0.5, 0.5])[:, None]
 _TINY = 1e-300
+_LEAST = 1e-4  # variance
 
 
 def _summed(values: Floats, *, keep: int) -> Floats:
@@ -192,25 +195,26 @@ class RatingSampler:
     def _propose_variances(self, own: Floats) -> tuple[Floats, Floats, Floats]:
         """(B, n) variances of each person's ratings if they attend, and if they do not.
 
-        One of them is the present one. The other is drawn: of who would attend from its prior, of
-        who would not from what their ratings say if none lapsed; third, the log of the latter's
-        density to its prior.
+        One of them is the present one. The other is drawn from what the ratings say if none lapsed,
+        or, of who would attend, as often from its prior: all that is unlike may have lapsed. Third,
+        the log densities of both draws to their priors, that of who attends subtracted.
         """
-        half, scale = self._priors.rating_df / 2, self._priors.careless_scale
-        given = _summed(self._main.answered * (self._main.given - own) ** 2, keep=2)
+        squares = _summed(self._main.answered * (self._main.given - own) ** 2, keep=2)
         away = self._anchors.given - self._person[..., None]
-        given += (self._anchors.answered * away**2).sum(axis=2)
-        shape, rate = 1 + self._given / 2, scale + given / 2
-        prior = half * self._typical[:, None] / self._gamma(np.full(rate.shape, half))
-        of_attending = np.where(self.attends, self._variance, np.maximum(prior, 1e-4))
-        drawn = np.maximum(rate / self._gamma(shape), 1e-4)
-        of_careless = np.where(self.attends, drawn, self._variance)
-        log = shape * np.log(rate) - gammaln(shape) - np.log(scale)
-        log -= (shape - 1) * np.log(of_careless) + (rate - scale) / of_careless
+        squares += (self._anchors.answered * away**2).sum(axis=2)
+        half, count = self._priors.rating_df / 2, self._given / 2
+        prior = _InverseGamma(np.full(count.shape, half), half * self._typical[:, None])
+        told = _InverseGamma(prior.shape + count, prior.rate + squares / 2)
+        from_prior = self._rng.random(count.shape) < 0.5
+        drawn = np.where(from_prior, prior.draw(self._rng), told.draw(self._rng))
+        of_attending = np.where(self.attends, self._variance, drawn)
+        log = -np.logaddexp(0.0, told.log(of_attending) - prior.log(of_attending)) + np.log(2)
+        alike = np.ones(count.shape)
+        prior = _InverseGamma(alike, self._priors.careless_scale * alike)
+        told = _InverseGamma(prior.shape + count, prior.rate + squares / 2)
+        of_careless = np.where(self.attends, told.draw(self._rng), self._variance)
+        log += told.log(of_careless) - prior.log(of_careless)
         return of_attending, of_careless, log
-
-    def _gamma(self, shape: Floats) -> Floats:
-        return np.maximum(self._rng.standard_gamma(shape), _TINY)
 
     def _propose_effects(self, own: Floats, variances: Floats) -> Floats:
         """What careless people's effects would be, did they attend; (B, n) log density to prior.
@@ -375,7 +379,7 @@ class RatingSampler:
         half = self._priors.rating_df / 2
         shape = np.where(self.attends, half, 1.0) + count / 2
         scale = np.where(self.attends, half * self._typical[:, None], self._priors.careless_scale)
-        self._variance = np.maximum((scale + squares / 2) / self._gamma(shape), 1e-4)
+        self._variance = _InverseGamma(shape, scale + squares / 2).draw(self._rng)
         who = self.attends & self.people
         shape = 2.0 + half * who.sum(axis=1)
         rate = 2.0 / self._priors.rating_sd**2 + half * np.where(who, 1 / self._variance, 0.0).sum(
@@ -398,13 +402,29 @@ class RatingSampler:
 
     def _inverse_gamma(self, typical: float, count: Floats, squares: Floats) -> Floats:
         """Variances whose prior is inverse gamma of shape 2 and mean typical²."""
-        gammas = self._gamma(2.0 + count / 2)
-        found: Floats = np.maximum((typical**2 + squares / 2) / gammas, 1e-4)
-        return found
+        return _InverseGamma(2.0 + count / 2, typical**2 + squares / 2).draw(self._rng)
 
     def _beta(self, prior: tuple[float, float], yes: Floats, no: Floats) -> Floats:
         found: Floats = self._rng.beta(prior[0] + yes, prior[1] + no)
         return found
+
+
+@dataclass(frozen=True, eq=False)
+class _InverseGamma:
+    """Distributions of variances."""
+
+    shape: Floats
+    rate: Floats
+
+    def draw(self, rng: np.random.Generator) -> Floats:
+        """One of each."""
+        gammas = np.maximum(rng.standard_gamma(self.shape), _TINY)
+        return np.maximum(self.rate / gammas, _LEAST)
+
+    def log(self, variance: Floats) -> Floats:
+        """Log density of each."""
+        log: Floats = self.shape * np.log(self.rate) - gammaln(self.shape) - self.rate / variance
+        return log - (self.shape + 1) * np.log(variance)
 
 
 class _Answers:
