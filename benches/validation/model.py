@@ -28,7 +28,7 @@ from tactileq.analysis.statistics.rates import clopper_pearson
 from tactileq.benches.validation.people.choices import CHOICE_WORLDS
 from tactileq.benches.validation.people.drawn import N_TEXTURES, DrawnStudies, World
 from tactileq.benches.validation.people.held_out import OTHER_WORLDS
-from tactileq.benches.validation.people.ratings import RATING_WORLDS
+from tactileq.benches.validation.people.ratings import RATER_WORLDS
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.checks import check_whole
 from tactileq.modeling.files.columns import Column, names
@@ -39,7 +39,7 @@ SIZES = (20, 36)
 AT_ONCE = 50  # studies that are sampled side by side
 SURE = 0.99  # of the interval that an aim has to lie in
 TEXTURES = tuple(f"texture {place + 1}" for place in range(N_TEXTURES))
-WORLDS: Mapping[str, World] = {**RATING_WORLDS, **OTHER_WORLDS, **CHOICE_WORLDS}
+WORLDS: Mapping[str, World] = {**RATER_WORLDS, **OTHER_WORLDS, **CHOICE_WORLDS}
 
 MODEL_COLUMNS = (
     Column("world", is_name=True),

@@ -274,7 +274,6 @@ def by_model(
         ),
         given=Described(**{name: values[:1] for name, values in vars(rated).items()}),
         replicated=rated,
-        repeats=1,
     )
     tests = with_people(found.tests, told, found.claim, caveats=found.caveats, decides=decides)
     return replace(found, tests=tests, people=told, by_model=decides)

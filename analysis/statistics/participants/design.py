@@ -103,19 +103,14 @@ def _cells(
 ) -> tuple[tuple[Integers, ...], tuple[int, ...]]:
     """Where each answer stands among (people, textures, models, repeats), and how many of each."""
     textures = textures_of(answers)
-    keys = ["participant_id", "texture"] + ["model"] * (len(models) > 1)
-    repeat = (
-        _in_order(answers).groupby(keys).cumcount().reindex(answers.index).to_numpy(dtype=np.intp)
-    )
-    person = _places(answers["participant_id"], people)
-    texture = _places(answers["texture"], textures)
-    model = np.zeros(len(answers), dtype=np.intp)
-    if len(models) > 1:
-        model = _places(answers["model"], models)
+    cells = _in_order(answers).groupby(["participant_id", "texture", "model"])
+    repeat = np.asarray(cells.cumcount().reindex(answers.index), dtype=np.intp)
+    places = [
+        _places(answers[column], names)
+        for column, names in (("participant_id", people), ("texture", textures), ("model", models))
+    ]
     repeats = int(repeat.max()) + 1 if len(repeat) else 1
-    shape = (len(people), max(len(textures), 1), len(models), repeats)
-    found: tuple[Integers, ...] = (person, texture, model, np.asarray(repeat, dtype=np.intp))
-    return found, shape
+    return (*places, repeat), (len(people), max(len(textures), 1), len(models), repeats)
 
 
 def _in_order(answers: pd.DataFrame) -> pd.DataFrame:

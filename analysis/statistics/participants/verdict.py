@@ -130,15 +130,12 @@ class PeopleFound(PeopleJudged):
         What people rated, (1,) and (1, n).
     replicated : Described
         What the same people could have rated, (S,) and (S, n) of S draws.
-    repeats : int
-        Ratings of a texture with a model, at most.
     """
 
     doubled: PeopleSummary
     people: pd.DataFrame
     given: Described
     replicated: Described
-    repeats: int
 
 
 def people_found(data: PeopleData, bounds: Bounds, *, rng: np.random.Generator) -> PeopleFound:
@@ -155,7 +152,6 @@ def people_found(data: PeopleData, bounds: Bounds, *, rng: np.random.Generator) 
             spread=draws.spread.reshape(-1, len(data.people)),
             repeated=draws.repeated.ravel(),
         ),
-        repeats=int(np.isfinite(data.studies.values).sum(axis=-1).max()),
     )
 
 

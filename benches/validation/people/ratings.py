@@ -247,6 +247,6 @@ _LINES: Mapping[str, tuple[str, _Ratings]] = {
         _Ratings(mean=-AT_BOUND, sd=2.0, first=13, day=6.0, day_sd=6.0),
     ),
 }
-RATING_WORLDS: Mapping[str, World] = {
+RATER_WORLDS: Mapping[str, World] = {
     name: World(line=line, draw=ratings) for name, (line, ratings) in _LINES.items()
 }

@@ -13,10 +13,10 @@ from tactileq.benches.validation.people import held_out
 from tactileq.benches.validation.people.choices import CHOICE_WORLDS
 from tactileq.benches.validation.people.drawn import DrawnStudies, on_days
 from tactileq.benches.validation.people.held_out import OTHER_WORLDS
-from tactileq.benches.validation.people.ratings import RATING_WORLDS
+from tactileq.benches.validation.people.ratings import RATER_WORLDS
 from tactileq.modeling.arrays import Floats
 
-ALL = {**RATING_WORLDS, **OTHER_WORLDS, **CHOICE_WORLDS}
+ALL = {**RATER_WORLDS, **OTHER_WORLDS, **CHOICE_WORLDS}
 STUDIES, PEOPLE = 100, 50
 ERRORS = 4.0  # standard errors within which a mean is recovered
 BY_DAY = [name for name in ALL if "day" in name or name in CHOICE_WORLDS]
@@ -152,7 +152,7 @@ def test_answers_show_the_planted_mean_apart_from_days(name: str):
 
 
 @pytest.mark.parametrize(
-    "name", [name for name in RATING_WORLDS if not {name} & {*AT_ENDS, *SHOWN, *BY_DAY}]
+    "name", [name for name in RATER_WORLDS if not {name} & {*AT_ENDS, *SHOWN, *BY_DAY}]
 )
 def test_ratings_show_the_planted_mean_on_each_texture(name: str):
     batch = drawn(name)
@@ -228,7 +228,7 @@ def test_people_differ_as_much_as_planted(name: str, variance: float):
 
 def test_an_sd_of_people_is_planted_where_their_effects_are_normal():
     other = {"one texture", "heavy tails", "one person in four", "exponential", "gains"}
-    for name in RATING_WORLDS:
+    for name in RATER_WORLDS:
         normal = not ({name} & other or "deviations" in name or name in BY_DAY)
         assert np.isnan(drawn(name).people_sd) != normal, name
 
@@ -258,7 +258,7 @@ def test_effects_on_single_textures_deviate_within_people(name: str, sd: float):
     assert within_errors(by_texture[inside].var(axis=1, ddof=1), expected)
 
 
-@pytest.mark.parametrize("name", RATING_WORLDS)
+@pytest.mark.parametrize("name", RATER_WORLDS)
 def test_anchors_are_rated_lower_by_who_attends(name: str):
     batch = drawn(name)
     below = batch.values.mean(axis=(2, 3, 4)) - 10

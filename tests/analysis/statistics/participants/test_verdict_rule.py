@@ -211,7 +211,6 @@ def test_people_are_told_only_as_far_as_they_are_sampled_well(
         assert told == pytest.approx([mean, mean - z * sd, mean + z * sd], abs=0.02)
     assert table.loc["b", ["effect", "ci_low", "ci_high"]].isna().all()
     assert table["careless"].tolist() == pytest.approx([np.nan, 0.8, 0.0], abs=1e-3, nan_ok=True)
-    assert found.repeats == 2
     assert found.replicated.spread.shape == (4000, 3)
     assert found.replicated.at_ends.shape == found.replicated.repeated.shape == (4000,)
     assert found.given.repeated[0] == pytest.approx(np.sqrt(50.0))
