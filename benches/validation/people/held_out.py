@@ -28,13 +28,7 @@ Integers = NDArray[np.intp]
 LEVEL, ANCHOR = 60.0, 25.0  # mean sensation of the textures, and of the two anchors
 PERSON_SD, TEXTURE_SD, CELL_SD, NOISE_SD = 7.0, 7.0, 4.0, 8.0
 ANCHORS = 2
-LOW, HIGH = POINTS
-
-GAIN_SPREAD = 0.35  # SD of the logarithm of people's gains
-FELT_SPREAD = 0.3  # SD of people's effects in sensation, as a share of the mean
-ADAPTING, CONTRAST = 0.3, 0.4  # speed of the adaptation level; how much of it is subtracted
-ASSIMILATION = 0.35  # most of the previous rating that enters the next
-FATIGUE, SINKING = 0.6, 4.0  # growth of the noise; points lost until the last trial
+HIGH = POINTS[1]
 
 NEVER = 0.1  # share of people who do not attend at all
 GIVEN_UP = 0.4  # share of the others who stop attending before the last trial
@@ -72,59 +66,6 @@ def _rated(
         attends=attends,
         people_sd=people_sd,
     )
-
-
-# Ratings beside the trials before
-
-
-def adapted(sensations: Floats, gain: Floats, assimilation: Floats) -> Floats:
-    """Ratings in the order of trials, as deviations from the start; (k, n, trials) each.
-
-    A sensation is rated beside an adaptation level that follows the sensations before, times
-    the person's gain, and is drawn towards the previous rating. Linear in the sensations.
-    """
-    level = np.zeros(sensations.shape[:-1])
-    before = np.zeros(sensations.shape[:-1])
-    ratings = np.empty(sensations.shape)
-    for trial in range(sensations.shape[-1]):
-        felt = sensations[..., trial]
-        before = (1 - assimilation) * gain * (felt - CONTRAST * level) + assimilation * before
-        level = (1 - ADAPTING) * level + ADAPTING * felt
-        ratings[..., trial] = before
-    return ratings
-
-
-def mean_response(gain: Floats, assimilation: Floats, trials: int) -> Floats:
-    """How many points the ratings of a person's models differ per unit of sensation; (k, n).
-
-    Averaged over random orders of half of the trials with an effect (anchors apart): a trial
-    follows one of its own model more rarely than one of the other, by 1 / (trials − 1).
-    """
-    impulse = np.zeros((*gain.shape, trials))
-    impulse[..., 0] = 1.0
-    lags = np.arange(trials)
-    weights = np.where(lags == 0, 1.0, -(trials - lags) / (trials * (trials - 1)))
-    return np.asarray((adapted(impulse, gain, assimilation) * weights).sum(axis=-1))
-
-
-def _adaptation(rng: np.random.Generator, shape: Shape) -> DrawnStudies:
-    trials = 2 * N_TEXTURES + ANCHORS
-    gain = np.exp(rng.normal(-(GAIN_SPREAD**2) / 2, GAIN_SPREAD, shape))
-    assimilation = rng.uniform(0, ASSIMILATION, shape)
-    effects = LOW * gain * rng.normal(1, FELT_SPREAD, shape)
-    felt = _sensations(rng, shape, 1)
-    response = mean_response(gain, assimilation, trials)
-    felt[..., 1, :] += (effects / response)[..., None, None]
-    positions = shuffled(rng, (*shape, trials))
-    in_time = np.take_along_axis(
-        _with_anchors(rng, felt) - LEVEL, np.argsort(positions, axis=-1), axis=-1
-    )
-    passed = np.linspace(0, 1, trials)
-    noise = NOISE_SD * (1 + FATIGUE * passed) * rng.standard_normal(in_time.shape)
-    rated = LEVEL + adapted(in_time, gain, assimilation) + noise - SINKING * passed
-    ratings = np.take_along_axis(rated, positions, axis=-1)
-    everybody = np.ones(shape, dtype=bool)
-    return _rated(ratings, positions, everybody, mean=np.full(N_TEXTURES, LOW))
 
 
 # Ratings that are given up
@@ -268,10 +209,6 @@ def _remembered(rng: np.random.Generator, shape: Shape) -> DrawnStudies:
 
 
 OTHER_WORLDS: Mapping[str, World] = {
-    "adaptation": World(
-        line="at the lower bound; gains differ, ratings follow the trials before, noise grows",
-        draw=_adaptation,
-    ),
     "giving up": World(
         line="at the bound in two groups; a tenth never attend, two fifths of the others stop",
         draw=_giving_up,

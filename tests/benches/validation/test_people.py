@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tactileq.benches.validation.people import held_out
 from tactileq.benches.validation.people.choices import CHOICE_WORLDS
 from tactileq.benches.validation.people.drawn import DrawnStudies, on_days
 from tactileq.benches.validation.people.held_out import OTHER_WORLDS
@@ -359,21 +358,6 @@ def test_a_seed_gives_the_same_studies():
             assert np.array_equal(getattr(first, field), getattr(again, field))
         assert not np.array_equal(first.values, other.values), name
         assert np.array_equal(first.planted, other.planted)
-
-
-def test_the_mean_response_of_adapting_people_is_that_over_random_orders():
-    """Ratings without noise of people whose other model is felt stronger by 1, anchors apart."""
-    rng = np.random.default_rng(8)
-    orders = held_out.shuffled(rng, (2000, 1, 16))
-    other = (orders < 7).astype(float)
-    gain, assimilation = np.full((2000, 1), 1.3), np.full((2000, 1), 0.3)
-    ratings = held_out.adapted(other, gain, assimilation)
-    reference = (orders >= 7) & (orders < 14)
-    seen = (ratings * other).sum(axis=-1) / 7 - (ratings * reference).sum(axis=-1) / 7
-    response = held_out.mean_response(gain, assimilation, 16)
-    assert within_errors(seen, float(response[0, 0]))
-    alone = held_out.mean_response(np.ones((1, 1)), np.zeros((1, 1)), 10**4)
-    assert alone[0, 0] == pytest.approx(1.0, abs=1e-3)
 
 
 def test_ratings_are_given_up_late():
