@@ -51,24 +51,24 @@ def _ratings(
         "careless participants": drawn.careless.sum(axis=1) + rng.random(studies),
         "lapsed trials": drawn.lapses,
         "SD of ratings": drawn.rating_sd,
+        "SD of deviations on textures": drawn.interaction_sd,
     }
-    if repeats > 1:
-        truth["SD of deviations on textures"] = drawn.interaction_sd
 
     def now() -> Quantities:
-        mean = sampler.population.mean
-        found = {
-            "mean effect": mean,
-            "effect on one texture": mean + sampler.texture_effects[:, 0],
-            "SD between people": sampler.population.sd,
-            "effect of one participant": sampler.effects[:, 0],
-            "careless participants": (~sampler.attends).sum(axis=1) + rng.random(studies),
-            "lapsed trials": sampler.lapses,
-            "SD of ratings": sampler.typical_sd,
-            "SD of deviations on textures": sampler.interaction_sd,
-        }
-        return {name: found[name] for name in truth}
+        values = (
+            sampler.population.mean,
+            sampler.population.mean + sampler.texture_effects[:, 0],
+            sampler.population.sd,
+            sampler.effects[:, 0],
+            (~sampler.attends).sum(axis=1) + rng.random(studies),
+            sampler.lapses,
+            sampler.typical_sd,
+            sampler.interaction_sd,
+        )
+        return dict(zip(truth, values, strict=repeats > 1))
 
+    if repeats == 1:
+        del truth["SD of deviations on textures"]
     for _ in range(WARM_UP):
         sampler.step()
     kept = []

@@ -37,7 +37,7 @@ def figure_people(found: ClaimFound, *, simulated: bool) -> Figure:
     Parameters
     ----------
     found : ClaimFound
-        Decided by the model of the participants.
+        About ratings, that the model of the participants was asked about.
     simulated : bool
         Written into the figure.
     """
@@ -49,22 +49,13 @@ def figure_people(found: ClaimFound, *, simulated: bool) -> Figure:
 
 
 def plot_people(found: ClaimFound, *, simulated: bool, ax: Axes | None = None) -> Axes:
-    """The effect of each participant with its 95 % interval, sorted, and the mean beside them.
-
-    Parameters
-    ----------
-    found : ClaimFound
-        Decided by the model of the participants.
-    simulated : bool
-        Written into the figure.
-    """
+    """The same in axes: effects with 95 % intervals, sorted, and the mean beside them."""
     ax = axes_or_new(ax)
-    unit, factor = unit_of(found.claim.measure)
     people = _people(found).people.sort_values("effect", ignore_index=True)
-    _draw_bounds(ax, found, factor)
-    _draw_people(ax, people, factor)
-    _draw_mean(ax, _people(found).summary, factor=factor, place=len(people) + 0.5)
-    _name_axes(ax, found, people=people, unit=unit)
+    _draw_bounds(ax, found)
+    _draw_people(ax, people)
+    _draw_mean(ax, _people(found).summary, place=len(people) + 0.5)
+    _name_axes(ax, found, people=people)
     ax.set_title(_title(found), loc="left", fontsize=10)
     stamp_if_simulated(ax, simulated)
     return ax
@@ -75,13 +66,13 @@ def _people(found: ClaimFound) -> PeopleFound:
     return found.people
 
 
-def _draw_bounds(ax: Axes, found: ClaimFound, factor: float) -> None:
+def _draw_bounds(ax: Axes, found: ClaimFound) -> None:
     assert found.claim.bounds is not None
-    ax.axhspan(*(factor * bound for bound in found.claim.bounds), color=GREY, alpha=0.15, lw=0)
+    ax.axhspan(*found.claim.bounds, color=GREY, alpha=0.15, lw=0)
     ax.axhline(0, color=BLACK, lw=0.8)
 
 
-def _draw_people(ax: Axes, people: pd.DataFrame, factor: float) -> None:
+def _draw_people(ax: Axes, people: pd.DataFrame) -> None:
     """Everybody's marker and interval."""
     careless: Bools = (people["careless"] > LIKELY).to_numpy()
     kinds = (
@@ -91,9 +82,9 @@ def _draw_people(ax: Axes, people: pd.DataFrame, factor: float) -> None:
     for which, (mark, colour), label in kinds:
         if which.any():
             at, own = np.flatnonzero(which), people[which]
-            ax.vlines(at, factor * own["ci_low"], factor * own["ci_high"], color=colour, lw=1.3)
+            ax.vlines(at, own["ci_low"], own["ci_high"], color=colour, lw=1.3)
             face = "white" if mark == CARELESS[0] else colour
-            ax.plot(at, factor * own["effect"], mark, color=colour, mfc=face, ms=5.5, label=label)
+            ax.plot(at, own["effect"], mark, color=colour, mfc=face, ms=5.5, label=label)
 
 
 def _careless_label(careless: pd.DataFrame) -> str:
@@ -103,15 +94,15 @@ def _careless_label(careless: pd.DataFrame) -> str:
     return fill(f"probably did not attend: {shown}", LEGEND_WIDTH)
 
 
-def _draw_mean(ax: Axes, summary: PeopleSummary, *, factor: float, place: float) -> None:
+def _draw_mean(ax: Axes, summary: PeopleSummary, *, place: float) -> None:
     """The mean effect on the right of all participants, with a line across."""
-    ax.vlines(place, factor * summary.mean_low, factor * summary.mean_high, color=BLACK, lw=3)
-    ax.axhline(factor * summary.mean, color=BLACK, lw=0.8, ls=":")
+    ax.vlines(place, summary.mean_low, summary.mean_high, color=BLACK, lw=3)
+    ax.axhline(summary.mean, color=BLACK, lw=0.8, ls=":")
     label = "mean of those who attend, 95% CI"
-    ax.plot(place, factor * summary.mean, "d", color=BLACK, mfc="white", mew=1.5, ms=9, label=label)
+    ax.plot(place, summary.mean, "d", color=BLACK, mfc="white", mew=1.5, ms=9, label=label)
 
 
-def _name_axes(ax: Axes, found: ClaimFound, *, people: pd.DataFrame, unit: str) -> None:
+def _name_axes(ax: Axes, found: ClaimFound, *, people: pd.DataFrame) -> None:
     count = len(people)
     if count <= MOST_TICKS:
         ax.set_xticks(range(count), [str(who) for who in people["participant_id"]])
@@ -121,7 +112,7 @@ def _name_axes(ax: Axes, found: ClaimFound, *, people: pd.DataFrame, unit: str) 
     ax.set_xlim(-0.8, count + 1.3)
     ax.set_xlabel(f"{count} participants, sorted by their effect")
     reference, other = found.claim.models
-    ax.set_ylabel(f"{other} − {reference}\n({unit})")
+    ax.set_ylabel(f"{other} − {reference}\n({unit_of(found.claim.measure)[0]})")
     finish_axes(ax)
 
 

@@ -197,7 +197,9 @@ def _judged(
 def summary_of(draws: Draws, *, converged: bool | None = None) -> PeopleSummary:
     """A posterior in short; `converged` in place of what its draws say."""
     middle = (0.5, 0.025, 0.975)
-    mean = np.quantile(draws.mean, [*middle, ALPHA, 1 - ALPHA])
+    if converged is None:
+        converged = draws.suffices(*VERDICT)
+    mean = np.quantile(draws.mean, [*middle, ALPHA, 1 - ALPHA]) if converged else np.full(5, np.nan)
     sd, careless = (
         np.quantile(getattr(draws, name), middle) if draws.suffices(name) else np.full(3, np.nan)
         for name in ("people_sd", "careless")
@@ -210,7 +212,7 @@ def summary_of(draws: Draws, *, converged: bool | None = None) -> PeopleSummary:
     return PeopleSummary(
         **dict(zip(fields, values, strict=True)),
         lapses=float(draws.lapses.mean()) if draws.suffices("lapses") else float("nan"),
-        converged=draws.suffices(*VERDICT) if converged is None else converged,
+        converged=converged,
     )
 
 

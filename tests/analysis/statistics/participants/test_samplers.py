@@ -26,7 +26,7 @@ from tactileq.analysis.statistics.participants.posterior import (
     well_sampled,
 )
 from tactileq.analysis.statistics.participants.ratings import RatingSampler
-from tactileq.analysis.statistics.participants.verdict import summary_of
+from tactileq.analysis.statistics.participants.verdict import PeopleSummary, summary_of
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.participants.ratings import HIGHEST, LOWEST, RatingPriors, RatingStudies
 
@@ -53,6 +53,11 @@ def ratings(
     return RatingStudies(
         values=values[None], anchors=anchors[None], trends=np.zeros((2, 1, *values.shape))
     )
+
+
+def told_by(draws: Draws) -> PeopleSummary:
+    """A posterior in short, though it has too few draws to be printed."""
+    return summary_of(draws, converged=True)
 
 
 def posterior(studies: RatingStudies, seed: int = 1) -> Draws:
@@ -145,7 +150,7 @@ def test_a_population_has_the_posterior_that_integration_gives(known: bool):
 def test_clean_ratings_give_the_interval_of_the_paired_t_test():
     rng = np.random.default_rng(5)
     study = ratings(rng, rng.normal(3.0, 6.0, 30))
-    found = summary_of(posterior(study))
+    found = told_by(posterior(study))
     differences = np.diff(study.values[0].mean(axis=(1, 3)), axis=1).ravel()
     low, high = stats.ttest_1samp(differences, 0.0).confidence_interval(0.95)
     width = high - low
@@ -162,7 +167,7 @@ def test_careless_people_are_found_and_do_not_move_the_mean():
     careless = 1 - draws.attends.mean(axis=(0, 1))
     assert (careless[:5] > 0.5).sum() >= 4  # one of them may answer like anybody by chance
     assert (careless[5:] < 0.2).all()
-    found = summary_of(draws)
+    found = told_by(draws)
     assert found.mean_low < 7.0 < found.mean_high
     assert found.mean > 5.5  # 19 of 24 times 7 is 5.5
 
@@ -181,7 +186,7 @@ def test_ratings_at_the_end_hide_no_difference():
     rng = np.random.default_rng(8)
     study = ratings(rng, np.full(36, 9.0), base=93.0)
     seen = np.diff(study.values[0].mean(axis=(1, 3)), axis=1).mean()
-    found = summary_of(posterior(study))
+    found = told_by(posterior(study))
     assert seen < 6.0  # the scale shows much less than 9
     assert found.mean_low < 9.0 < found.mean_high
     assert not found.inside(BOUNDS)
@@ -214,9 +219,9 @@ def test_missing_people_change_nothing_but_the_random_numbers():
     parts = first_people(whole, [12, 24])
     assert np.isnan(parts.values[0, 12:]).all()
     padded, everybody = (
-        summary_of(one) for one in rating_draws(parts, rng=np.random.default_rng(1), effort=SHORT)
+        told_by(one) for one in rating_draws(parts, rng=np.random.default_rng(1), effort=SHORT)
     )
-    alone = summary_of(
+    alone = told_by(
         posterior(
             RatingStudies(
                 values=whole.values[:, :12],
