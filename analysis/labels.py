@@ -49,7 +49,7 @@ def significance_mark(p: float) -> str:
 
 def signed(value: float, digits: int) -> str:
     """A number with its sign, with a true minus sign."""
-    return f"{value:+.{digits}f}".replace("-", "−")
+    return f"{round(value, digits) + 0.0:+.{digits}f}".replace("-", "−")
 
 
 def names_or_none(textures: Iterable[str]) -> str:

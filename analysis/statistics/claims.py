@@ -182,7 +182,8 @@ def _tests(
     overall = _row(_over_textures(compared), claim.bounds, values=values, rng=rng)
     overall |= {"texture": ALL_TEXTURES, "p_holm": overall["p"]}
     overall["p_equivalence_holm"] = overall["p_equivalence"]
-    apart = people_test(differences_of(compared).to_numpy(dtype=float))
+    wide = differences_of(compared)
+    apart = people_test(wide.to_numpy(dtype=float), values.contrasts_of(wide.index))
     overall |= {"people_f": apart.f, "people_p": apart.p}
     overall |= {"people_df": apart.df_people, "people_df_rest": apart.df_rest}
     textures = pd.DataFrame(

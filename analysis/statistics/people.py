@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
+from tactileq.analysis.statistics.crossover import mean_differences
 from tactileq.analysis.statistics.equivalence import ALPHA, Bounds
 from tactileq.analysis.statistics.paired import holm
 from tactileq.modeling.arrays import Bools, Floats, Integers
@@ -59,26 +60,31 @@ class FTest:
     p: float
 
 
-def people_test(differences: Floats) -> FTest:
+def people_test(differences: Floats, contrasts: Floats | None = None) -> FTest:
     """Whether people's mean differences differ by more than their differences on single textures.
 
     Parameters
     ----------
     differences : (n, T) ndarray
         Other − reference of each person on each texture; people with a NaN are left out.
+    contrasts : (n, c) ndarray, optional
+        Days, apart from which people differ (`crossover.day_contrasts`).
     """
-    complete = differences[np.isfinite(differences).all(axis=1)]
+    known = np.isfinite(differences).all(axis=1)
+    complete = differences[known]
     n, textures = complete.shape
-    df_people, df_rest = max(n - 1, 0), max(n - 1, 0) * max(textures - 1, 0)
+    days = None if contrasts is None else contrasts[known]
+    means = mean_differences(complete.mean(axis=1)[None, :], days)
+    df_people, df_rest = max(means.df, 0), max(n - 1, 0) * max(textures - 1, 0)
     nothing = FTest(f=float("nan"), df_people=df_people, df_rest=df_rest, p=float("nan"))
-    if not df_rest:
+    if not (df_rest and df_people) or means.confounded:
         return nothing
     of_people = complete.mean(axis=1, keepdims=True)
     rest = complete - of_people - complete.mean(axis=0) + complete.mean()
     within = float((rest**2).sum()) / df_rest
     if within < 1e-18:
         return nothing
-    f = textures * float(of_people.var(ddof=1)) / within
+    f = textures * means.size * float(means.error[0]) ** 2 / within
     p = float(stats.f.sf(f, df_people, df_rest))
     return FTest(f=f, df_people=df_people, df_rest=df_rest, p=p)
 

@@ -199,12 +199,15 @@ def people_data(responses: Responses, claim: Claim) -> PeopleData | None:
     same = list(responses.identical(claim.models))
     answers = answers_about(responses, claim)
     answers = answers[~answers["texture"].isin(same) & answers[claim.measure].notna()]
+    both = answers.groupby("texture")["model"].transform("nunique") == len(claim.models)
+    answers = answers[both]  # of a texture that nobody rated with a model nothing is known
     people = sorted(answers["participant_id"].unique())
     checks = responses.anchors.get(claim.task, answers[:0])
     checks = checks[checks["participant_id"].isin(people)]
     if len(people) < FEWEST:
         return None
-    contrasts = day_contrasts(responses.answers[claim.task], claim.models)
+    asked = responses.answers[claim.task]
+    contrasts = day_contrasts(asked[asked[claim.measure].notna()], claim.models)
     even = balanced(contrasts[contrasts.index.isin(people)])
     return PeopleData(
         studies=rating_studies(answers, checks, claim.measure, models=claim.models, people=people),

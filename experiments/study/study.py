@@ -258,10 +258,11 @@ class Study(DescribedFile):
                 f"{claim.name}, got {shown(unknown[0])}; correct it."
             )
         if asks_the_model(self.plan, claim) and plan.participants < FEWEST_OF_MODEL:
+            few = " and remove few" if self.plan.rule == WITHDRAWN else ""
             raise InputError(
                 f"expected {FEWEST_OF_MODEL} participants or more in [{claim.task}] for the rule "
                 f'"{self.plan.rule}" of the claim {claim.name}, got {plan.participants}; plan '
-                f'{FEWEST_OF_MODEL} or more, or write rule = "tests" in [plan].'
+                f'{FEWEST_OF_MODEL} or more, or write rule = "tests" in [plan]{few}.'
             )
 
     def language_of_session(self, asked: str) -> str:

@@ -99,11 +99,6 @@ def _subject(found: Sequence[ClaimFound]) -> str:
 
 
 def _what(one: ClaimFound, found: Sequence[ClaimFound]) -> str:
-    """The measure, with its task or pair of models where several claims share the measure."""
-    claim, what = one.claim, MEASURES[one.claim.measure]
-    others = [each.claim for each in found if each.claim.measure == claim.measure]
-    if len({each.task for each in others}) > 1:
-        what += f" of the {TASK_TITLES[claim.task]}"
-    if len({each.models for each in others}) > 1:
-        what += f" ({claim.models[1]})"
-    return what
+    """The measure, with the claim's name where several claims share the measure."""
+    shared = sum(each.claim.measure == one.claim.measure for each in found) > 1
+    return f"{MEASURES[one.claim.measure]}{f' (“{one.claim.name}”)' * shared}"

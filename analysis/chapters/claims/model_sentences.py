@@ -17,7 +17,7 @@ from tactileq.analysis.statistics.participants.posterior import (
     Effort,
 )
 from tactileq.analysis.statistics.participants.verdict import FEWEST
-from tactileq.analysis.statistics.verdicts import ClaimFound
+from tactileq.analysis.statistics.verdicts import ClaimFound, overall_row
 from tactileq.modeling.files.claims import WITHDRAWN
 from tactileq.modeling.participants.ratings import AT_END, RatingPriors
 
@@ -51,17 +51,19 @@ def model_methods(found: Sequence[ClaimFound]) -> list[str]:
 
 def decided_by_tests(responses: Responses, found: Sequence[ClaimFound]) -> list[str]:
     """Why tests decided planned claims about ratings although a plan names a model, if so."""
+    beside = any(one.people is not None for one in found)
     if responses.plan.rule == WITHDRAWN:
         return [
             "The plan registered the rule “model”, which said how many people feel a difference. "
             "These words are not printed any more: one or two ratings of each texture cannot tell "
-            "how many do. The verdicts are those of the registered tests; the hierarchical model "
-            "of ratings that took its place stands beside them."
-        ]
+            "how many do. The verdicts are those of the registered tests"
+            + "; the hierarchical model of ratings that took its place stands beside them" * beside
+            + "."
+        ] * any(one.claim.planned and not one.caveats.unfinished for one in found)
     if responses.plan.rule != MODEL_RULE:
         return []
     own = [one for one in found if one.claim.planned and one.claim.measure in SCALES]
-    own = [one for one in own if not (one.by_model or one.caveats.unfinished or one.tests.empty)]
+    own = [one for one in own if not one.by_model and _is_judged(one)]
     uneven = [one.claim.name for one in own if one.people is not None]
     few = [one.claim.name for one in own if one.people is None]
     return [
@@ -71,6 +73,11 @@ def decided_by_tests(responses: Responses, found: Sequence[ClaimFound]) -> list[
         f"Decided by tests although the plan names the hierarchical model, since fewer than "
         f"{FEWEST} people answered: {'; '.join(few)}."
     ] * bool(few)
+
+
+def _is_judged(found: ClaimFound) -> bool:
+    row = overall_row(found)
+    return row is not None and not found.caveats.unfinished and bool(row["verdict"])
 
 
 def _rating_sentences(priors: RatingPriors) -> list[str]:
@@ -116,11 +123,10 @@ def _sampler() -> str:
 
 def _rule() -> str:
     return (
-        "By the model a claim is called equivalent where the 90% interval of the mean effect lies "
-        "within the bounds and the 95% interval contains 0, different where only the latter does "
-        "not hold and the former neither, different but within bounds where the 90% interval lies "
-        "within the bounds and the 95% interval excludes 0, and inconclusive otherwise; single "
-        "textures are judged by normal posterior probabilities with Holm's correction."
+        "By the model a difference is shown where the 95% interval of the mean effect excludes 0, "
+        "and it lies within the bounds where the 90% interval does: equivalent is the latter, "
+        "different the former, different but within bounds both, and inconclusive neither. "
+        "Single textures are judged by normal posterior probabilities with Holm's correction."
     )
 
 

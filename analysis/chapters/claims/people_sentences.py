@@ -14,6 +14,7 @@ from tactileq.analysis.statistics.equivalence import ALPHA, WITHIN_BOUNDS
 from tactileq.analysis.statistics.people import MOST_REPEATS
 from tactileq.analysis.statistics.verdicts import ClaimFound, Row
 from tactileq.modeling.errors import counted
+from tactileq.modeling.files.answer_tables import ANSWER_TABLES
 from tactileq.modeling.files.columns import p_value
 
 WORTH_A_WORD = 0.05  # share of careless people, or of ratings at an end, that may part two verdicts
@@ -22,9 +23,9 @@ NEAR_NONE = 1.0  # points: below it the lower limit of an SD tells nothing from 
 
 def do_people_differ(found: ClaimFound, row: Row) -> str:
     """The F test, the SD between people, and how many feel it, as far as the design can tell."""
-    parts = [_differ(found, row), how_many(found)]
-    said = "; ".join(part for part in parts if part)
-    return f"Do people differ? {sentence_case(said)}." if said else ""
+    differ, many = _differ(found, row), how_many(found, doubt=row["doubt"])
+    said = sentence_case("; ".join(part for part in (differ, many) if part))
+    return f"{'Do people differ? ' * bool(differ)}{said}." if said else ""
 
 
 def _differ(found: ClaimFound, row: Row) -> str:
@@ -46,27 +47,38 @@ def _spread(found: ClaimFound) -> str:
     unit, factor = unit_of(found.claim.measure)
     what = "SD of people and days" if found.by_day else "SD of personal effects"
     if own.sd_low < NEAR_NONE:
-        return f"{what} at most {factor * own.sd_high:.1f} {unit} (95%)"
+        return f"{what} at most {factor * own.sd_high:.1f} {unit} (95% CI)"
     return (
         f"{what} {factor * own.sd:.1f} {unit} (95% CI {factor * own.sd_low:.1f} to "
         f"{factor * own.sd_high:.1f})"
     )
 
 
-def how_many(found: ClaimFound) -> str:
-    """How many participants differ by more than the bounds; or why nobody can say it."""
+def how_many(found: ClaimFound, *, doubt: str = "") -> str:
+    """How many participants differ by more than the bounds; or why nobody can say it.
+
+    Parameters
+    ----------
+    doubt : str
+        Why equality must not be concluded: then nothing is said of nobody.
+    """
     counts = found.people_count
     if counts is None:
         return ""
     if counts.by_day:
         return "with the models on different days, people and days cannot be told apart"
     if counts.repeats < counts.needed:
-        ratings = f"{counted(counts.repeats, 'answer')} on each texture with each model"
-        least = f"{counts.needed} are needed" if counts.needed < MOST_REPEATS else "too few"
-        return f"{ratings} cannot say how many feel it ({least})"
+        each = "" if ANSWER_TABLES[found.claim.task].both_models else " with each model"
+        answers = f"{counted(counts.repeats, 'answer')} on each texture{each}"
+        least = f"{counts.needed} are needed"
+        if counts.needed >= MOST_REPEATS:
+            least = "no number would, with these bounds"
+        return f"{answers} cannot say how many feel it ({least})"
+    if doubt and not counts.beyond:
+        return ""
     return (
         f"{counts.beyond} of {counted(counts.people, 'participant')} "
-        f"{'differs' if counts.beyond == 1 else 'differ'} by more than the bounds (Holm)"
+        f"{'is' if counts.beyond == 1 else 'are'} shown to differ by more than the bounds (Holm)"
     )
 
 

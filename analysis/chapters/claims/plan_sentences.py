@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tactileq.analysis.answers.plan import EQUIVALENCE, Claim
+from tactileq.analysis.answers.plan import Claim
 from tactileq.analysis.answers.responses import Responses
 from tactileq.analysis.chapters.claims.model_sentences import decided_by_tests, model_methods
 from tactileq.analysis.labels import MEASURES, SCALES, TASK_TITLES
@@ -114,7 +114,8 @@ def _left_out(found: Sequence[ClaimFound]) -> list[str]:
             more = len(lacking) - len(named)
             rest = f" and {more} more" if more else ""
             sentences.append(
-                f"Left out of {one.claim.name} over all textures, and for the textures named, "
+                f"Left out of {'the tests of ' * one.by_model}{one.claim.name} over all textures, "
+                f"and for the textures named, "
                 f"because answers are incomplete: {'; '.join(named)}{rest}."
             )
     return sentences
@@ -144,7 +145,7 @@ def _bounds(found: Sequence[ClaimFound]) -> list[str]:
         for claim in bounded
         if claim.bounds is not None
     )
-    planned = all(claim.planned and claim.test == EQUIVALENCE for claim in bounded)
+    planned = all(claim.planned for claim in bounded)
     when = "fixed before the first answer" if planned else "some of them fixed after the data"
     return [
         "Equivalence was tested by two one-sided t-tests (TOST; Schuirmann, 1987) at a level of 5% "

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import pandas as pd
 
@@ -43,10 +44,14 @@ IN_SHORT_COLUMNS = (
     Column("difference"),
     Column("ci_low", "95% CI from"),
     Column("ci_high", "to"),
+    Column("ci90_low", "90% CI from"),
+    Column("ci90_high", "to"),
     Column("bound_low", "allowed from"),
     Column("bound_high", "to"),
     Column("textures", "textures that differ"),
     Column("people_sd", "SD between people"),
+    Column("people_sd_low", "95% CI from"),
+    Column("people_sd_high", "to"),
     Column("people_p", "p that people differ", is_p_value=True),
     Column("rule", "decided by", is_name=True),
     Column("beside", "the other rule says", is_name=True),
@@ -164,19 +169,23 @@ def _in_short(found: Sequence[ClaimFound], *, simulated: bool) -> Table:
         row = overall_row(one)
         if row is None:
             continue
-        by_model = one.by_model and one.people is not None
-        middle, low, high = ("model_mean", "model_low", "model_high")
-        if not by_model:
-            middle, low, high = ("mean_difference", "ci_low", "ci_high")
+        decides = one.people if one.by_model else None
+        effect: dict[Hashable, Any] = {
+            name: row[name] for name in ("ci_low", "ci_high", "ci90_low", "ci90_high")
+        }
+        effect |= {"difference": row["mean_difference"], "n": row["n"]}
+        if decides is not None:
+            own = decides.summary
+            effect |= {"difference": own.mean, "n": len(decides.people)}
+            effect |= {"ci_low": own.mean_low, "ci_high": own.mean_high}
+            effect |= {"ci90_low": own.mean90_low, "ci90_high": own.mean90_high}
         groups = by_verdict(one)
         differ = [str(each["texture"]) for word in DIFFERENCES for each in groups.get(word, [])]
-        beside = row["tests_verdict"] if by_model else row["model_verdict"]
+        beside = row["tests_verdict"] if decides is not None else row["model_verdict"]
         rows.append(
             {
                 **row,
-                "difference": row[middle],
-                "ci_low": row[low],
-                "ci_high": row[high],
+                **effect,
                 "verdict": row["verdict"] or NO_TEST,
                 "people_p": row["people_p"] if one.claim.measure in SCALES else float("nan"),
                 "textures": ", ".join(differ),

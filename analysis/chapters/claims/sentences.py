@@ -50,7 +50,8 @@ SAID = {
 }
 TOO_LARGE = "a difference is shown, larger than allowed"
 NOT_DIFFERENT = "no difference is shown, and without bounds equivalence cannot be tested"
-_JOINTLY = "all textures jointly equivalent (largest p of equivalence below .05)"
+_JOINTLY = "all textures jointly within the bounds (largest p of equivalence below .05)"
+_BY_90 = (EQUIVALENT, WITHHELD, WITHIN_BOUNDS, BOUNDS_WITHHELD)
 
 
 def claim_in_short(found: ClaimFound, row: Row, *, what: str, where: str = "") -> str:
@@ -77,15 +78,17 @@ def claim_in_short(found: ClaimFound, row: Row, *, what: str, where: str = "") -
     if verdict in (INTERIM, NO_TEST, NOT_CONVERGED):
         return f"{sentence_case(what)}{where}: {said}."
     parts = [f"{sentence_case(what)}{where}: {_difference(found, row)}: {said}."]
-    parts += [_which_textures(found, row), do_people_differ(found, row), _if_doubled(found, row)]
+    parts += [_which_textures(found, row), do_people_differ(found, row)]
+    parts += [_if_doubled(found, row), _model_beside(found, row)]
     return " ".join(part for part in parts if part)
 
 
 def _beyond(found: ClaimFound, row: Row) -> bool:
-    """Whether the whole 95 % interval lies beyond a bound."""
+    """Whether the whole 95 % interval lies beyond a bound; the mean where nobody varies."""
     if found.claim.bounds is None:
         return False
-    _, low, high = _interval(found, row, level="95%")
+    mean, *limits = _interval(found, row, level="95%")
+    low, high = (mean if np.isnan(limit) else limit for limit in limits)
     return bool(low > found.claim.bounds[1] or high < found.claim.bounds[0])
 
 
@@ -103,21 +106,26 @@ def _interval(found: ClaimFound, row: Row, *, level: str) -> tuple[float, float,
 def _difference(found: ClaimFound, row: Row) -> str:
     """`5.8 points of 100 lower with simplified models (95% CI −9.4 to −2.5; allowed ±7.5)`.
 
-    The interval is the one that the verdict rests on: 90 % where it says or withholds equivalence.
+    The interval is the one that the verdict rests on: 90 % where it says or withholds equivalence,
+    both of a difference within the bounds.
     """
-    level = "90%" if row["verdict"] in (EQUIVALENT, WITHHELD) else "95%"
     unit, factor = unit_of(found.claim.measure)
-    mean, low, high = (factor * value for value in _interval(found, row, level=level))
-    interval = f"{level} CI {signed(low, 1)} to {signed(high, 1)}"
-    if np.isnan(low):
-        interval = "no interval, since participants do not vary"
+    verdict, intervals, mean = row["verdict"], [], float("nan")
+    for level in ("95%", "90%"):
+        mean, low, high = (factor * value for value in _interval(found, row, level=level))
+        wanted = verdict in (EQUIVALENT, WITHHELD) if level == "95%" else verdict not in _BY_90
+        if not wanted and np.isfinite(low):
+            intervals.append(f"{level} CI {signed(low, 1)} to {signed(high, 1)}")
+    inside = ", ".join(intervals) or f"no interval, {row['note'] or 'since people do not vary'}"
     if found.claim.bounds is not None:
-        interval += f"; allowed {_allowed(found.claim.bounds, factor)}"
+        inside += f"; allowed {_allowed(found.claim.bounds, factor)}"
+    reference, other = found.claim.models
+    size = f"{abs(mean):.1f} {unit}"
     if ANSWER_TABLES[found.claim.task].both_models:
-        than = f"above chance, {found.claim.models[1]} among {found.claim.models[0]} models"
-        return f"{signed(mean, 1)} {unit} {than} ({interval})"
+        side = "above" if mean >= 0 else "below"
+        return f"{size} {side} chance, {other} among {reference} models ({inside})"
     direction = "higher" if mean > 0 else "lower"
-    return f"{abs(mean):.1f} {unit} {direction} with {found.claim.models[1]} models ({interval})"
+    return f"{size} {direction} with {other} than with {reference} models ({inside})"
 
 
 def _allowed(bounds: tuple[float, float], factor: float) -> str:
@@ -129,12 +137,13 @@ def _allowed(bounds: tuple[float, float], factor: float) -> str:
 
 def _which_textures(found: ClaimFound, row: Row) -> str:
     """Which single textures a difference comes from, and what the others show."""
-    groups = by_verdict(found)
+    groups = {name: rows for name, rows in by_verdict(found).items() if name != NO_TEST}
     differ = [one for verdict in DIFFERENCES for one in groups.get(verdict, [])]
     count = sum(map(len, groups.values()))
+    if count < 2:
+        return ""
     if not differ:
-        alone = row["verdict"] in DIFFERENCES and count > 1
-        return "No single texture shows it." * alone
+        return "No single texture shows it (Holm)." * (row["verdict"] in DIFFERENCES)
     others = [str(one["texture"]) for name, rows in groups.items() for one in rows]
     names = [str(one["texture"]) for one in differ]
     others = [name for name in others if name not in names]
@@ -146,7 +155,7 @@ def _which_textures(found: ClaimFound, row: Row) -> str:
     if not others:
         return f"{verb} {shown}."
     rest = ", ".join(others) if len(others) <= MOST_NAMED else f"the other {len(others)}"
-    return f"{verb} {shown}; {rest} {'shows' if len(others) == 1 else 'show'} none."
+    return f"{verb} {shown}; {rest} {'shows' if len(others) == 1 else 'show'} none (Holm)."
 
 
 def _mean_of(found: ClaimFound, row: Row) -> float:
@@ -159,9 +168,16 @@ def _if_doubled(found: ClaimFound, row: Row) -> str:
         return ""
     word = found.people.doubled.verdict(found.claim.bounds)
     word = found.caveats.allowed(word, share_at_ends=row["share_at_ends"])
-    if word == row["verdict"]:
+    if word in (row["verdict"], NOT_CONVERGED):
         return ""
     return f"With priors twice as wide the verdict would be “{word}”."
+
+
+def _model_beside(found: ClaimFound, row: Row) -> str:
+    """That the model, where it does not decide, says something else."""
+    if found.by_model or row["model_verdict"] in ("", NOT_CONVERGED, row["verdict"]):
+        return ""
+    return f"The hierarchical model beside the tests says “{row['model_verdict']}”."
 
 
 def claim_sentences(found: ClaimFound) -> list[str]:
@@ -225,7 +241,10 @@ def _overall(found: ClaimFound, row: Row) -> str:
             shown = row["tests_verdict"] or NO_TEST
             tests = f"paired tests: {shown}, {tests}"
         text += f"; {tests}"
-    return f"{sentence_case(text)} (participants: {row['n']})."
+    people = f"participants: {row['n']}"
+    if found.by_model and found.people is not None:
+        people = f"participants: {len(found.people.people)}, in the tests {row['n']}"
+    return f"{sentence_case(text)} ({people})."
 
 
 def _tests(row: Row) -> str:

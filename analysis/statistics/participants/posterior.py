@@ -18,6 +18,7 @@ from tactileq.modeling.files.answer_tables import ENDS
 from tactileq.modeling.participants.ratings import RatingPriors, RatingStudies
 
 HIGHEST_R_HAT, FEWEST_EFFECTIVE = 1.05, 400.0
+MOST_APART = 0.2  # of the people, by which chains may differ in how many attend
 VERDICT = ("mean", "textures")  # what verdicts rest on
 PRINTED = (*VERDICT, "people_sd", "effects", "careless")
 
@@ -73,8 +74,14 @@ class Draws:
     spread: Floats
     repeated: Floats
 
+    @property
+    def converged(self) -> bool:
+        """Whether verdicts may rest on it: `VERDICT`, and chains that agree how many attend."""
+        attending = self.attends.mean(axis=(1, 2))
+        return self.suffices(*VERDICT) and bool(np.ptp(attending) <= MOST_APART)
+
     def suffices(self, *names: str) -> bool:
-        """Whether these quantities are sampled well enough to be printed, or to rest words on."""
+        """Whether these quantities are sampled well enough to be printed."""
         return all(well_sampled(getattr(self, name)).all() for name in names)
 
 
@@ -142,8 +149,8 @@ def rating_draws(
         for name, values in vars(studies).items()
     }
     sampler = RatingSampler(RatingStudies(**repeated), priors or RatingPriors(), rng=rng)
-    for _ in range(effort.warm_up):
-        sampler.step()
+    for step in range(effort.warm_up):
+        sampler.step(all_attend=step < effort.warm_up // 2)
     kept: list[Mapping[str, Any]] = []
     for step in range(effort.steps):
         sampler.step()
@@ -159,7 +166,11 @@ def sufficient_draws(
 ) -> list[Draws]:
     """As `rating_draws`, with `LONGER` effort of those studies that need it."""
     found = rating_draws(studies, rng=rng, priors=priors)
-    short = [place for place, draws in enumerate(found) if not draws.suffices(*PRINTED)]
+    short = [
+        place
+        for place, draws in enumerate(found)
+        if not (draws.converged and draws.suffices(*PRINTED))
+    ]
     if short:
         taken = {
             name: np.take(values, short, axis=axis_of_studies(name))

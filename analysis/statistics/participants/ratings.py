@@ -110,9 +110,13 @@ class RatingSampler:
         rated = np.where(lapsed, lapsed_ratings(self._rng, shape), rated)
         return np.where(self._main.answered, rated, np.nan)
 
-    def step(self) -> None:
-        """Draw every unknown once, given all others."""
-        self._draw_classes()
+    def step(self, *, all_attend: bool = False) -> None:
+        """Draw every unknown once, given all others; at first with everybody attending.
+
+        Chains begin far from the answers, where nobody seems to attend, and where nobody does
+        nothing tells the effects any more: some would never come back.
+        """
+        self._draw_classes(all_attend=all_attend)
         self._draw_anchors()
         self._draw_effects()
         self._draw_levels()
@@ -148,7 +152,7 @@ class RatingSampler:
         felt: Floats = self._texture[:, None, :, None, None] + _HALVES * effects[..., None, None]
         return felt
 
-    def _draw_classes(self) -> None:
+    def _draw_classes(self, *, all_attend: bool) -> None:
         """Who attends, which trials lapsed, and the latent judgements beyond the ends.
 
         What a person rates a texture at stays as it is, whether the texture or their own deviation
@@ -176,7 +180,8 @@ class RatingSampler:
         log += self._anchors.log_ratio(*anchors, self.lapses)
         made_up = self._cell**2 - (self._cell - texture) ** 2
         log += 0.5 * made_up.sum(axis=2) / self._cell_variance[:, None]
-        self.attends = self._rng.random(log.shape) < 1 / (1 + np.exp(-np.clip(log, -500, 500)))
+        share = 1.0 if all_attend else 1 / (1 + np.exp(-np.clip(log, -500, 500)))
+        self.attends = self._rng.random(log.shape) < share
         self._variance = np.where(self.attends, of_attending, of_careless)
         sd = np.sqrt(self._variance)[each]
         sd_own = np.sqrt(of_careless)[..., None]

@@ -17,7 +17,6 @@ from tactileq.analysis.statistics.caveats import NOT_CONVERGED
 from tactileq.analysis.statistics.equivalence import ALPHA, Bounds, combined
 from tactileq.analysis.statistics.participants.design import PeopleData, first_people, side_by_side
 from tactileq.analysis.statistics.participants.posterior import (
-    VERDICT,
     Described,
     Draws,
     Effort,
@@ -198,7 +197,7 @@ def summary_of(draws: Draws, *, converged: bool | None = None) -> PeopleSummary:
     """A posterior in short; `converged` in place of what its draws say."""
     middle = (0.5, 0.025, 0.975)
     if converged is None:
-        converged = draws.suffices(*VERDICT)
+        converged = draws.converged
     mean = np.quantile(draws.mean, [*middle, ALPHA, 1 - ALPHA]) if converged else np.full(5, np.nan)
     sd, careless = (
         np.quantile(getattr(draws, name), middle) if draws.suffices(name) else np.full(3, np.nan)

@@ -14,7 +14,6 @@ from tactileq.experiments.sessions.kept.overrides import Overrides
 from tactileq.experiments.study.study import Study
 from tactileq.modeling import InputError
 from tactileq.modeling.errors import shown
-from tactileq.modeling.files.claims import PlanSection
 from tactileq.modeling.files.documents import dump_json, read_json_object
 from tactileq.modeling.files.places import locked
 
@@ -65,14 +64,24 @@ def require_same_data_set(root: Path, manifest: SessionManifest, *, overrides: O
     Raises
     ------
     InputError
-        As `claim_data_set`; where there is none, for a plan with a rule that was withdrawn.
+        As `claim_data_set`.
     """
     path = root / DESCRIPTION_NAME
-    if not os.path.lexists(path):
-        PlanSection.read(manifest.study.get("plan", {})).require_current()
-    else:
+    if os.path.lexists(path):
         found = read_json_object(path, advice="choose another data folder for these sessions")
         _check(found, describe_data_set(manifest), path=path, overrides=overrides)
+
+
+def require_rule(root: Path, study: Study) -> None:
+    """Refuse to begin a data set of a study with a rule of verdicts that was withdrawn.
+
+    Raises
+    ------
+    InputError
+        Names the rule to write; not where the data set has begun.
+    """
+    if not os.path.lexists(root / DESCRIPTION_NAME):
+        study.plan.require_current()
 
 
 def require_study(root: Path, study: Study) -> None:

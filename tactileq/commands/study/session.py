@@ -72,6 +72,7 @@ def session(
     from tactileq.commands.study.experimenter import Terminal
     from tactileq.experiments.console.languages import texts_of_study
     from tactileq.experiments.sessions.bids.export import export_session
+    from tactileq.experiments.sessions.kept.data_set import require_rule
     from tactileq.experiments.sessions.kept.log import SEAL_WRITTEN
     from tactileq.experiments.sessions.kept.overrides import Overrides
     from tactileq.experiments.sessions.loop.people import ConsentRefused
@@ -85,6 +86,7 @@ def session(
     from tactileq.experiments.tasks import task_named
 
     plan = Study.load(study)
+    require_rule(data, plan)
     texts = texts_of_study(plan)
     sets, sources = models_of_study(plan, study, models=models, simplified=simplified, scene=scene)
     if resume and not language:

@@ -42,6 +42,7 @@ def simulate(
 
     Example: tactileq simulate --models models --simplified simplified --data data
     """
+    from tactileq.experiments.sessions.kept.data_set import require_rule
     from tactileq.experiments.study.study import Study
     from tactileq.modeling import Threshold
     from tactileq.modeling.files.provenance import provenance_text
@@ -51,6 +52,7 @@ def simulate(
     ran = CommandRun("simulate")
     ran.reads(study, Threshold.file_of(threshold))
     plan = Study.load(study)
+    require_rule(data, plan)
     if unknown := [name for name in plan.textures if name not in TEXTURES]:
         raise ValueError(
             f"expected a study of the planted textures {', '.join(TEXTURES)}, which take the place "

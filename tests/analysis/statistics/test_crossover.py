@@ -198,13 +198,17 @@ def test_days_count_from_each_participants_first_session() -> None:
     pd.testing.assert_frame_equal(one, other)
 
 
-def test_where_anybody_had_both_models_in_a_session_days_do_not_count() -> None:
+def test_where_most_had_both_models_in_a_session_days_do_not_count() -> None:
     mixed = [(1, "full"), (1, "simplified"), (2, "full"), (2, "simplified")]
     apart = [(1, "full"), (2, "simplified")]
-    for sessions in ({"a": mixed, "b": mixed}, {"a": mixed, "b": apart}):
+    for sessions in ({"a": mixed, "b": mixed}, {"a": mixed, "b": mixed, "c": apart}):
         contrasts = day_contrasts(answers(sessions), MODELS)
-        assert contrasts.shape == (2, 0)
+        assert contrasts.shape == (len(sessions), 0)
         assert balanced(contrasts)
+    # One person with both in a session does not hide the days of the others.
+    by_day = day_contrasts(answers({"a": mixed, "b": apart, "c": apart[::-1]}), MODELS)
+    assert by_day.shape == (3, 1)
+    assert by_day.loc["a"].item() == 0.0
     single = {"a": [(1, "full"), (1, "simplified")]}
     assert day_contrasts(answers(single), MODELS).shape == (1, 0)
 

@@ -259,3 +259,20 @@ def test_bounds_that_no_number_of_repeats_can_tell() -> None:
     assert repeats_for_ratings((-0.1, 0.1), rating_sd=9.0, **size) == MOST_REPEATS
     assert repeats_for_shares((-0.001, 0.001), chance=1 / 3, **size) == MOST_REPEATS
     assert repeats_for_shares((-0.5, 0.5), chance=0.5, **size) == MOST_REPEATS  # beyond is nothing
+
+
+def test_people_differ_apart_from_what_a_day_adds_to_all() -> None:
+    """Nobody differs; half of the people gain six points from day to day, the others lose them."""
+    rng = np.random.default_rng(12)
+    order = np.where(np.arange(20) < 10, -1.0, 1.0)
+    shown = {"plain": 0, "apart": 0}
+    studies = 400
+    for _ in range(studies):
+        differences = 6.0 * order[:, None] + rng.normal(0.0, 9.0, (20, 7))
+        apart = people_test(differences, order[:, None])
+        assert (apart.df_people, apart.df_rest) == (18, 114)
+        shown["apart"] += apart.p < 0.05
+        shown["plain"] += people_test(differences).p < 0.05
+    assert shown["plain"] > 0.9 * studies
+    low, high = stats.binomtest(shown["apart"], studies).proportion_ci(0.999)
+    assert low < 0.05 < high

@@ -67,10 +67,15 @@ def test_the_answer_is_the_verdicts_with_their_intervals(people, own):
         row = overall_row(one)
         assert row is not None
         equal = row["verdict"] in ("equivalent", "equivalence withheld")
-        ends, level = (("ci90_low", "ci90_high"), "90") if equal else (("ci_low", "ci_high"), "95")
+        within = row["verdict"] in ("different but within bounds", "different, bounds withheld")
         factor = 100 if one.claim.measure == "correct" else 1
-        low, high = (f"{factor * row[name]:+.1f}".replace("-", "−") for name in ends)
-        assert f"({level}% CI {low} to {high}; allowed ±" in point
+        for level, ends, shown in (
+            ("95", ("ci_low", "ci_high"), not equal),
+            ("90", ("ci90_low", "ci90_high"), equal or within),
+        ):
+            low, high = (f"{factor * row[name]:+.1f}".replace("-", "−") for name in ends)
+            assert (f"{level}% CI {low} to {high}" in point) is shown
+        assert "; allowed ±" in point
     assert "PVC (" in headline.points[0]
 
 

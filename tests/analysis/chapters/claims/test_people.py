@@ -187,7 +187,11 @@ def test_people_are_counted_only_where_the_design_can_tell(one, found):
     assert "(9 are needed)" in how_many(few)
     assert "Holm" not in how_many(few)
     enough = replace(one, people_count=PeopleCount(repeats=9, needed=9, beyond=3, people=16))
-    assert how_many(enough).startswith("3 of 16 participants differ")
+    assert how_many(enough).startswith("3 of 16 participants are shown to differ")
+    nobody = replace(one, people_count=PeopleCount(repeats=9, needed=9, beyond=0, people=16))
+    assert how_many(nobody).startswith("0 of 16 participants are shown to differ")
+    assert how_many(nobody, doubt="anchors failed") == ""
+    assert how_many(enough, doubt="anchors failed").startswith("3 of 16")
     days = replace(one, people_count=PeopleCount(repeats=9, needed=9, by_day=True))
     assert "days" in how_many(days)
     assert how_many(replace(found[2], people_count=None)) == ""
@@ -221,7 +225,7 @@ def test_that_tests_say_something_else_is_said_with_the_reasons(one):
 def test_textures_are_told_by_the_model(one):
     same = claim_sentences(by_model(one, SUMMARIES[EQUIVALENT]))[1]
     assert f"{EQUIVALENT}: aluminum, canvas" in same
-    assert "jointly equivalent" in same
+    assert "jointly within the bounds" in same
     apart = claim_sentences(by_model(one, SUMMARIES[DIFFERENT]))[1]
     assert "canvas +6.0 points of 100 (95% CI +2.0 to +9.0)" in apart
     assert "Holm" not in apart
@@ -281,6 +285,13 @@ def test_the_page_on_the_model_states_the_priors_that_are_used():
         for row in rows
     }
     assert stated == {name: list(np.atleast_1d(v)) for name, v in vars(RatingPriors()).items()}
+
+
+def test_the_model_beside_the_tests_is_heard_where_it_says_something_else(one):
+    beside = by_model(one, SUMMARIES[INCONCLUSIVE], decides=False)
+    assert f"“{INCONCLUSIVE}”" in told(beside)
+    same = replace(beside, tests=beside.tests.assign(model_verdict=beside.tests["verdict"]))
+    assert "hierarchical" not in told(same)
 
 
 def test_claims_that_tests_decide_in_spite_of_the_plan_are_named_with_the_reason(responses, found):

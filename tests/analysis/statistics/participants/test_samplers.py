@@ -421,3 +421,28 @@ def test_longer_is_sampled_only_what_did_not_suffice(monkeypatch: pytest.MonkeyP
         found = sufficient_draws(studies, rng=rng)
         assert [draws.mean.shape for draws in found] == [(2, count) for count in kept]
         assert [draws.mean.mean() > 10 for draws in found] == [False, True, False]
+
+
+def test_no_chain_begins_where_nobody_seems_to_attend() -> None:
+    """Five repeats of eight people who all attend, as priors twice as wide have it."""
+    rng = np.random.default_rng(21)
+    once = ratings(rng, rng.normal(-3.0, 3.0, 8))
+    values = np.clip(np.repeat(once.values, 5, axis=-1) + rng.normal(0, 8, (1, 8, 7, 2, 5)), 0, 100)
+    many = RatingStudies(
+        values=values, anchors=np.empty((1, 8, 0)), trends=np.zeros((2, *values.shape))
+    )
+    wide = RatingPriors().doubled()
+    (draws,) = rating_draws(many, rng=np.random.default_rng(3), priors=wide, effort=SHORT)
+    assert (draws.attends.mean(axis=(1, 2)) > 0.7).all()
+
+
+def test_chains_that_disagree_on_who_attends_did_not_converge() -> None:
+    rng = np.random.default_rng(22)
+    wide = rng.normal(0.0, 1.0, (8, 400))
+    told = {name: np.zeros((8, 400)) for name in vars(posterior(ratings(rng, np.zeros(8))))}
+    told |= {"mean": wide, "textures": rng.normal(0.0, 1.0, (8, 400, 4))}
+    attends = np.ones((8, 400, 10), dtype=bool)
+    assert Draws(**{**told, "attends": attends}).converged
+    attends = attends.copy()
+    attends[0] = False
+    assert not Draws(**{**told, "attends": attends}).converged
