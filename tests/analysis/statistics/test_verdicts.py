@@ -484,3 +484,16 @@ def test_people_are_counted_where_repeats_suffice_and_only_there(answers):
     assert once_only.repeats == 1 < once_only.needed
     assert once_only.people == 0
     assert claims_found(answers, rng=rng())[2].people_count is None  # of right answers by model
+
+
+def test_a_texture_that_nobody_rated_with_a_model_has_no_verdict(answers):
+    own = answers.answers["absolute"]
+    gone = (own["texture"] == "MDF") & (own["model"] == "simplified")
+    cut = replace(by_model(answers), answers={"absolute": own[~gone]})
+    (found, *_) = claims_found(cut, rng=rng())
+    table = found.tests.set_index("texture")
+    assert found.by_model
+    assert table.loc["MDF", "verdict"] == table.loc["MDF", "model_verdict"] == ""
+    assert np.isnan(table.loc["MDF", "model_mean"])
+    assert table.loc[ALL_TEXTURES, "verdict"]  # of the others
+    assert len(found.people.people) == 16

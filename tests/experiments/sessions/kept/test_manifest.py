@@ -6,6 +6,7 @@ import hashlib
 import json
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
@@ -14,7 +15,9 @@ import numpy as np
 import pytest
 
 from tactileq.experiments.sessions.kept import program
+from tactileq.experiments.sessions.kept.data_set import require_rule
 from tactileq.experiments.sessions.kept.manifest import SessionManifest
+from tactileq.experiments.study.study import Study
 from tactileq.modeling import InputError
 from tests.refusals import refused
 
@@ -109,3 +112,14 @@ def test_trials_are_numbered_and_have_a_phase(
 ) -> None:
     with refused(InputError, expected=["trials", "number", "phase"]):
         manifest_of(trials=[trial])
+
+
+def test_a_rule_that_was_withdrawn_begins_no_data_set_and_goes_on_in_one(tmp_path: Path) -> None:
+    study = Study.load()
+    old = replace(study, plan=replace(study.plan, rule="model"))
+    require_rule(tmp_path, study)
+    with refused(InputError, expected=["hierarchical", "tests"], got="model"):
+        require_rule(tmp_path, old)
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "dataset_description.json").write_text("{}")
+    require_rule(tmp_path, old)
