@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from tactileq.analysis.page.drawing import (
     BLACK,
@@ -72,3 +73,4 @@ def _draw_people(ax: Axes, predicted: Floats, given: Floats) -> None:
     ax.set_xlabel("participants, in rising order")
     ax.set_ylabel("SD of a person's ratings (points)")
     ax.set_ylim(bottom=0)
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))

@@ -50,7 +50,7 @@ IN_SHORT_COLUMNS = (
     Column("bound_high", "to"),
     Column("textures", "textures that differ"),
     Column("people_sd", "SD between people"),
-    Column("people_sd_low", "95% CI from"),
+    Column("people_sd_low", "SD of people: 95% CI from"),
     Column("people_sd_high", "to"),
     Column("people_p", "p that people differ", is_p_value=True),
     Column("rule", "decided by", is_name=True),
@@ -198,7 +198,7 @@ def _in_short(found: Sequence[ClaimFound], *, simulated: bool) -> Table:
         "Difference: other − reference, over the textures whose models differ, in points of the "
         "scale or shares of right answers, by what decides. Everything else is in the supplement.",
         pd.DataFrame(rows, columns=names(IN_SHORT_COLUMNS)),
-        IN_SHORT_COLUMNS,
+        without(IN_SHORT_COLUMNS, "bound_low", "bound_high", "people_sd"),
         simulated,
     )
 
