@@ -52,7 +52,9 @@ def plot_people(found: ClaimFound, *, simulated: bool, ax: Axes | None = None) -
     """The same in axes: effects with 95 % intervals, sorted, and the mean beside them."""
     ax = axes_or_new(ax)
     people = _people(found).people.sort_values("effect", ignore_index=True)
-    _draw_bounds(ax, found)
+    assert found.claim.bounds is not None
+    ax.axhspan(*found.claim.bounds, color=GREY, alpha=0.15, lw=0)
+    ax.axhline(0, color=BLACK, lw=0.8)
     _draw_people(ax, people)
     _draw_mean(ax, _people(found).summary, place=len(people) + 0.5)
     _name_axes(ax, found, people=people)
@@ -64,12 +66,6 @@ def plot_people(found: ClaimFound, *, simulated: bool, ax: Axes | None = None) -
 def _people(found: ClaimFound) -> PeopleFound:
     assert found.people is not None
     return found.people
-
-
-def _draw_bounds(ax: Axes, found: ClaimFound) -> None:
-    assert found.claim.bounds is not None
-    ax.axhspan(*found.claim.bounds, color=GREY, alpha=0.15, lw=0)
-    ax.axhline(0, color=BLACK, lw=0.8)
 
 
 def _draw_people(ax: Axes, people: pd.DataFrame) -> None:

@@ -5,7 +5,7 @@ docs/method/participants.md#data
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,33 +69,26 @@ def rating_studies(
     return RatingStudies(values=values, anchors=_anchors(checks, column, people), trends=trends)
 
 
-def axis_of_studies(name: str) -> int:
-    """The axis of the studies in the array of `RatingStudies` of this name."""
-    return 1 if name == "trends" else 0
+def changed(studies: RatingStudies, change: Callable[[Floats, int], Floats]) -> RatingStudies:
+    """Each array changed by a function of it and of its axis of studies."""
+    return RatingStudies(
+        **{name: change(values, int(name == "trends")) for name, values in vars(studies).items()}
+    )
 
 
 def first_people(studies: RatingStudies, sizes: Sequence[int]) -> RatingStudies:
     """Studies of the first people of one study alone, one for each size."""
-    changed = {}
-    for name, values in vars(studies).items():
-        tiled = np.repeat(values, len(sizes), axis=axis_of_studies(name))
-        if name != "trends":
-            for one, size in zip(tiled, sizes, strict=True):
-                one[size:] = np.nan
-        changed[name] = tiled
-    return RatingStudies(**changed)
+    tiled = changed(studies, lambda values, axis: np.repeat(values, len(sizes), axis=axis))
+    for place, size in enumerate(sizes):
+        tiled.values[place, size:] = np.nan
+        tiled.anchors[place, size:] = np.nan
+    return tiled
 
 
 def side_by_side(studies: Sequence[RatingStudies]) -> RatingStudies:
     """Studies of one shape as those of one object, in their order."""
-    return RatingStudies(
-        **{
-            name: np.concatenate(
-                [getattr(one, name) for one in studies], axis=axis_of_studies(name)
-            )
-            for name in vars(studies[0])
-        }
-    )
+    arrays = zip(*(vars(one).values() for one in studies), strict=True)
+    return changed(studies[0], lambda _, axis: np.concatenate(next(arrays), axis=axis))
 
 
 def _cells(

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tactileq.analysis.statistics.participants.design import axis_of_studies
+from tactileq.analysis.statistics.participants.design import changed
 from tactileq.analysis.statistics.participants.ratings import RatingSampler
 from tactileq.modeling.arrays import Bools, Floats
 from tactileq.modeling.files.answer_tables import ENDS
@@ -144,11 +144,8 @@ def rating_draws(
         Smaller studies filled up with missing answers.
     """
     effort, count = effort or Effort(), len(studies.values)
-    repeated = {
-        name: np.repeat(values, effort.chains, axis=axis_of_studies(name))
-        for name, values in vars(studies).items()
-    }
-    sampler = RatingSampler(RatingStudies(**repeated), priors or RatingPriors(), rng=rng)
+    chains = changed(studies, lambda one, axis: np.repeat(one, effort.chains, axis=axis))
+    sampler = RatingSampler(chains, priors or RatingPriors(), rng=rng)
     for step in range(effort.warm_up):
         sampler.step(all_attend=step < effort.warm_up // 2)
     kept: list[Mapping[str, Any]] = []
@@ -172,11 +169,8 @@ def sufficient_draws(
         if not (draws.converged and draws.suffices(*PRINTED))
     ]
     if short:
-        taken = {
-            name: np.take(values, short, axis=axis_of_studies(name))
-            for name, values in vars(studies).items()
-        }
-        again = rating_draws(RatingStudies(**taken), rng=rng, priors=priors, effort=LONGER)
+        taken = changed(studies, lambda one, axis: np.take(one, short, axis=axis))
+        again = rating_draws(taken, rng=rng, priors=priors, effort=LONGER)
         for place, draws in zip(short, again, strict=True):
             found[place] = draws
     return found

@@ -47,11 +47,6 @@ def _heavy_tails(rng: np.random.Generator, shape: Shape) -> Floats:
     return rng.standard_t(3, shape) / sqrt(3)
 
 
-def _one_in_four(rng: np.random.Generator, shape: Shape) -> Floats:
-    """A quarter feels it, the others do not; mean 0, SD 1."""
-    return np.where(rng.random(shape) < 0.25, sqrt(3), -1 / sqrt(3))
-
-
 @dataclass(frozen=True, kw_only=True)
 class _Ratings:
     """People who rate each texture with each model some times, and anchors.
@@ -70,8 +65,8 @@ class _Ratings:
         SD of the deviations of people's effects on single textures.
     gain_sd : float
         SD of the logarithm of the gain of people's effects.
-    careless, lapses : float
-        Shares of people who do not attend, and of trials.
+    careless : float
+        Share of people who do not attend.
     at_place : bool
         Who does not attend rates near a place of their own, not all over the scale.
     to_ends : float
@@ -90,7 +85,6 @@ class _Ratings:
     gain_sd: float = 0.0
     careless: float = 0.0
     at_place: bool = False
-    lapses: float = 0.0
     heaping: bool = False
     to_ends: float = 0.0
     first: int = -1
@@ -109,8 +103,6 @@ class _Ratings:
         ratings += _trends_and_noise(rng, orders)
         careless = rng.random(shape) < self.careless
         ratings[careless] = self._unfelt(rng, ratings.shape)[careless]
-        lapsed = rng.random(ratings.shape) < self.lapses
-        ratings[lapsed] = rng.uniform(0, 100, ratings.shape)[lapsed]
         kept = on_slider(self._moved(rng, ratings))
         planted = np.full(N_TEXTURES, self.mean)
         if self.only:
@@ -171,20 +163,16 @@ def _trends_and_noise(rng: np.random.Generator, orders: Floats) -> Floats:
 _LINES: Mapping[str, tuple[str, _Ratings]] = {
     "none, SD 2": ("no mean effect, SD 2 between people", _Ratings(sd=2.0)),
     "none, SD 6": ("no mean effect, SD 6 between people", _Ratings(sd=6.0)),
-    "none, deviations 6, 3 repeats": (
-        "no mean effect; people's effects on single textures deviate with an SD of 6",
-        _Ratings(deviation_sd=6.0, repeats=3),
-    ),
     "none, deviations 10": (
-        "the same with an SD of 10 and a single rating",
+        "no effect but of people on single textures, with an SD of 10; a single rating",
         _Ratings(sd=0.0, deviation_sd=10.0),
     ),
     "none, deviations 10, 3 repeats": (
-        "the same with an SD of 10 and 3 repeats",
+        "the same with 3 repeats",
         _Ratings(sd=0.0, deviation_sd=10.0, repeats=3),
     ),
     "none, deviations 10, 5 repeats": (
-        "the same with an SD of 10 and 5 repeats",
+        "the same with 5 repeats",
         _Ratings(sd=0.0, deviation_sd=10.0, repeats=5),
     ),
     "twice the bound": ("mean of 15 points, SD 4 between people", _Ratings(mean=2 * AT_BOUND)),
@@ -205,22 +193,11 @@ _LINES: Mapping[str, tuple[str, _Ratings]] = {
         "at the bound; 30 % of people rate all, anchors too, near a place of their own",
         _Ratings(mean=AT_BOUND, careless=0.3, at_place=True),
     ),
-    "10 % lapsed trials": (
-        "at the bound; a tenth of everybody's trials are rated uniformly at random",
-        _Ratings(mean=AT_BOUND, lapses=0.1),
-    ),
     "base 95": ("at the lower bound; the reference at 95", _Ratings(mean=-AT_BOUND, base=95.0)),
-    "heaping": (
-        "at the bound; 60 % of people round to 5, 25 % to 10",
-        _Ratings(mean=AT_BOUND, heaping=True),
-    ),
+    "heaping": ("at the bound; most round to 5 or 10", _Ratings(mean=AT_BOUND, heaping=True)),
     "heavy tails": (
         "at the bound; effects of Student's t with 3 degrees of freedom, SD 5",
         _Ratings(mean=AT_BOUND, sd=5.0, spread=_heavy_tails),
-    ),
-    "one person in four": (
-        "at the bound on average: a quarter feels much more than the others",
-        _Ratings(mean=AT_BOUND, sd=8.0, spread=_one_in_four),
     ),
     "exponential": (
         "at the bound; exponential effects, SD 5",
