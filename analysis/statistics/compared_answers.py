@@ -21,26 +21,12 @@ from tactileq.analysis.statistics.claims import (
 from tactileq.analysis.statistics.crossover import day_contrasts
 from tactileq.modeling import InputError
 from tactileq.modeling.files.answer_tables import ANSWER_TABLES, ENDS, AnswerTable
-from tactileq.modeling.participants.choices import (
-    ODDITY,
-    DecisionModel,
-    forced_choice,
-)
-
-
-def decision_model(task: str, answers: pd.DataFrame) -> DecisionModel | None:
-    """The decision model of a task with right answers, by its chance; None where none is known."""
-    if ANSWER_TABLES[task].both_models:
-        return ODDITY if is_oddity(ANSWER_TABLES[task]) else None
-    chance = chance_of(task, answers)
-    if np.isnan(chance) or not np.isclose(1 / chance, round(1 / chance)):
-        return None
-    return forced_choice(round(1 / chance))
+from tactileq.modeling.participants.choices import ODDITY_CHANCE
 
 
 def is_oddity(table: AnswerTable) -> bool:
     """Whether a task is to find the odd one of three, by what its table declares."""
-    return table.both_models and bool(np.isclose(table.chance, ODDITY.chance))
+    return table.both_models and bool(np.isclose(table.chance, ODDITY_CHANCE))
 
 
 def all_claims(responses: Responses) -> tuple[Claim, ...]:

@@ -98,7 +98,9 @@ class MeanDifferences:
         return self.adjusted[:, :0] if self.confounded else self.adjusted
 
 
-def mean_differences(differences: Floats, contrasts: Floats | None = None) -> MeanDifferences:
+def mean_differences(
+    differences: Floats | MeanDifferences, contrasts: Floats | None = None
+) -> MeanDifferences:
     """Least squares of differences on their mean and on days.
 
     With two days this is the t-test of the AB/BA crossover design: the mean of the two groups'
@@ -106,11 +108,13 @@ def mean_differences(differences: Floats, contrasts: Floats | None = None) -> Me
 
     Parameters
     ----------
-    differences : (k, n) ndarray
-        Finite.
+    differences : (k, n) ndarray or MeanDifferences
+        Finite; the latter as they are.
     contrasts : (n, c) ndarray, optional
         Of `day_contrasts`; none where days do not count.
     """
+    if isinstance(differences, MeanDifferences):
+        return differences
     n = differences.shape[1]
     days = np.empty((n, 0)) if contrasts is None else contrasts
     if not n:

@@ -100,9 +100,7 @@ def one_sided_tests(
     differences: Floats | MeanDifferences, bounds: Bounds
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """t and p against the lower, then against the upper bound, (k,) each, of (k, n) differences."""
-    found = differences
-    if not isinstance(found, MeanDifferences):
-        found = mean_differences(found)
+    found = mean_differences(differences)
     with np.errstate(divide="ignore", invalid="ignore"):  # where nobody varies
         t_low, t_high = ((found.mean - bound) / found.error for bound in bounds)
     return t_low, stats.t.sf(t_low, found.df), t_high, stats.t.cdf(t_high, found.df)

@@ -216,9 +216,7 @@ def t_tests(
     differences: Floats | MeanDifferences, *, confidence: float = CONFIDENCE
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """The same of each row of (k, n) differences, (k,) each."""
-    found = differences
-    if not isinstance(found, MeanDifferences):
-        found = mean_differences(found)
+    found = mean_differences(differences)
     with np.errstate(divide="ignore", invalid="ignore"):  # where nobody varies
         t = found.mean / found.error
     half = found.error * stats.t.ppf((1 + confidence) / 2, found.df)
@@ -289,9 +287,9 @@ def without_rounding_noise(differences: Floats) -> Floats:
 
 def why_undefined(differences: Floats | MeanDifferences) -> str:
     """Why no t-test can be made of these differences of one sample; empty where one can."""
-    found = differences
-    if not isinstance(found, MeanDifferences):
-        found = mean_differences(found[None, :])
+    if isinstance(differences, np.ndarray):
+        differences = differences[None, :]
+    found = mean_differences(differences)
     count = found.adjusted.shape[1]
     if found.confounded:
         return CONFOUNDED

@@ -40,7 +40,12 @@ from tactileq.analysis.statistics.participants.design import (
     rating_studies,
     textures_of,
 )
-from tactileq.analysis.statistics.participants.verdict import FEWEST, PeopleFound, people_found
+from tactileq.analysis.statistics.participants.verdict import (
+    FEWEST,
+    PeopleFound,
+    PeopleSummary,
+    people_found,
+)
 from tactileq.analysis.statistics.people import (
     PeopleCount,
     beyond_bounds_by_ratings,
@@ -85,6 +90,19 @@ class ClaimFound:
     by_model: bool = False
     by_day: bool = False
     people_count: PeopleCount | None = None
+
+
+def word_of(found: ClaimFound, summary: PeopleSummary, row: Row) -> str:
+    """What a posterior says over all textures, without equality where there is doubt.
+
+    Parameters
+    ----------
+    row : Row
+        Over all textures.
+    """
+    assert found.claim.bounds is not None
+    word = summary.verdict(found.claim.bounds)
+    return found.caveats.allowed(word, share_at_ends=row["share_at_ends"])
 
 
 def overall_row(found: ClaimFound) -> Row | None:
@@ -158,6 +176,7 @@ class ClaimsBegun:
         tests = claim_tests(claim, values, caveats=caveats, rng=rng)
         people = next(self.sampled) if data is not None else None
         decides = data is not None and data.decides
+        by_day = bool(values.contrasts.shape[1])
         if people is not None:
             tests = with_people(tests, people, claim, caveats=caveats, decides=decides)
         return ClaimFound(
@@ -167,8 +186,8 @@ class ClaimsBegun:
             caveats=caveats,
             people=people,
             by_model=decides,
-            by_day=bool(values.contrasts.shape[1]),
-            people_count=_people_count(responses, claim),
+            by_day=by_day,
+            people_count=_people_count(responses, claim, by_day=by_day),
         )
 
 
@@ -196,9 +215,7 @@ def people_data(responses: Responses, claim: Claim) -> PeopleData | None:
         return None
     if claim.measure not in SCALES:
         return None
-    same = list(responses.identical(claim.models))
-    answers = answers_about(responses, claim)
-    answers = answers[~answers["texture"].isin(same) & answers[claim.measure].notna()]
+    answers = _compared(responses, claim)
     both = answers.groupby("texture")["model"].transform("nunique") == len(claim.models)
     answers = answers[both]  # of a texture that nobody rated with a model nothing is known
     people = sorted(answers["participant_id"].unique())
@@ -217,7 +234,14 @@ def people_data(responses: Responses, claim: Claim) -> PeopleData | None:
     )
 
 
-def _people_count(responses: Responses, claim: Claim) -> PeopleCount | None:
+def _compared(responses: Responses, claim: Claim) -> pd.DataFrame:
+    """The answers about a claim on textures whose models differ, without missing ones."""
+    answers = answers_about(responses, claim)
+    same = answers["texture"].isin(list(responses.identical(claim.models)))
+    return answers[~same & answers[claim.measure].notna()]
+
+
+def _people_count(responses: Responses, claim: Claim, *, by_day: bool) -> PeopleCount | None:
     """How many participants differ by more than the bounds of a claim; None where it has none.
 
     docs/method/statistics.md#people
@@ -227,9 +251,7 @@ def _people_count(responses: Responses, claim: Claim) -> PeopleCount | None:
         return None
     if not (both or claim.measure in SCALES):
         return None
-    answers = answers_about(responses, claim)
-    answers = answers[~answers["texture"].isin(list(responses.identical(claim.models)))]
-    answers = answers[answers[claim.measure].notna()]
+    answers = _compared(responses, claim)
     people = sorted(answers["participant_id"].unique())
     if not people:
         return None
@@ -246,7 +268,6 @@ def _people_count(responses: Responses, claim: Claim) -> PeopleCount | None:
         beyond, of = counted_people(p) if repeats >= needed else (0, 0)
         return PeopleCount(repeats=repeats, needed=needed, beyond=beyond, people=of)
     needed = repeats_for_ratings(claim.bounds, rating_sd=RatingPriors().rating_sd, **size)
-    by_day = bool(day_contrasts(responses.answers[claim.task], claim.models).shape[1])
     beyond, of = 0, 0
     if repeats >= needed and not by_day:
         nobody = answers[:0]

@@ -54,21 +54,23 @@ def _ratings(
         "SD of deviations on textures": drawn.interaction_sd,
     }
 
-    def now() -> Quantities:
-        values = (
-            sampler.population.mean,
-            sampler.population.mean + sampler.texture_effects[:, 0],
-            sampler.population.sd,
-            sampler.effects[:, 0],
-            (~sampler.attends).sum(axis=1) + rng.random(studies),
-            sampler.lapses,
-            sampler.typical_sd,
-            sampler.interaction_sd,
-        )
-        return dict(zip(truth, values, strict=repeats > 1))
-
-    if repeats == 1:
+    if repeats == 1:  # held at 0
         del truth["SD of deviations on textures"]
+
+    def now() -> Quantities:
+        """The same in the present state of the sampler."""
+        mean = sampler.population.mean
+        return {
+            "mean effect": mean,
+            "effect on one texture": mean + sampler.texture_effects[:, 0],
+            "SD between people": sampler.population.sd,
+            "effect of one participant": sampler.effects[:, 0],
+            "careless participants": (~sampler.attends).sum(axis=1) + rng.random(studies),
+            "lapsed trials": sampler.lapses,
+            "SD of ratings": sampler.typical_sd,
+            "SD of deviations on textures": sampler.interaction_sd,
+        }
+
     for _ in range(WARM_UP):
         sampler.step()
     kept = []

@@ -5,10 +5,6 @@ docs/method/participants.md#choices
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache, partial
-
 import numpy as np
 from scipy.special import ndtr
 
@@ -18,8 +14,7 @@ from tactileq.modeling.errors import InputError, shown
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(200)
 _FURTHEST = 10.0  # normal values beyond it do not count
-_STEP = 0.01  # of the tables, in d′
-_LOWEST, _HIGHEST = -5.0, 10.0
+ODDITY_CHANCE = 1 / 3  # of finding the odd one of three by guessing
 
 
 def m_afc_share(d_prime: Floats | float, *, alternatives: int) -> Floats:
@@ -76,67 +71,3 @@ def _shares(found: Floats) -> Floats:
 def _density(x: Floats) -> Floats:
     found: Floats = np.exp(-0.5 * x * x) / np.sqrt(2 * np.pi)
     return found
-
-
-@dataclass(frozen=True, kw_only=True)
-class DecisionModel:
-    """From d′ to the share of right answers of somebody who attends.
-
-    Parameters
-    ----------
-    chance : float
-        Share of right answers of somebody who guesses.
-    exact : callable
-        From d′ to shares; a d′ below 0 of a task whose trials hold both models counts as 0.
-    both_models : bool
-        Whether a trial holds both models, so that d′ is what lies between them.
-    """
-
-    chance: float
-    exact: Callable[[Floats], Floats]
-    both_models: bool
-
-    @property
-    def table(self) -> Floats:
-        """Shares at d′ from −5 in steps of 0.01."""
-        return _table(self)
-
-    def share(self, d_prime: Floats) -> Floats:
-        """Shares by linear interpolation of the table, to 1e-5; any shape.
-
-        Beyond the table's ends, −5 and 10, they are those at the ends.
-        """
-        place = np.clip(d_prime, _LOWEST, _HIGHEST - 2 * _STEP)
-        place -= _LOWEST
-        place /= _STEP
-        below = place.astype(np.intp)
-        place -= below
-        table, steps = _table(self), _steps(self)
-        found: Floats = table[below]
-        place *= steps[below]
-        found += place
-        return found
-
-
-@cache
-def _table(model: DecisionModel) -> Floats:
-    d_prime = np.arange(_LOWEST, _HIGHEST + _STEP / 2, _STEP)
-    return model.exact(np.maximum(d_prime, 0.0) if model.both_models else d_prime)
-
-
-@cache
-def _steps(model: DecisionModel) -> Floats:
-    return np.diff(_table(model))
-
-
-ODDITY = DecisionModel(chance=1 / 3, exact=oddity_share, both_models=True)
-
-
-@cache
-def forced_choice(alternatives: int) -> DecisionModel:
-    """The decision model of m-alternative forced choice."""
-    return DecisionModel(
-        chance=1 / alternatives,
-        exact=partial(m_afc_share, alternatives=alternatives),
-        both_models=False,
-    )

@@ -13,7 +13,7 @@ from tactileq.analysis.chapters.claims.people_figure import figure_people
 from tactileq.analysis.chapters.claims.predictive_figure import figure_predictive
 from tactileq.analysis.page.page import Fold, Item, Picture, Table
 from tactileq.analysis.statistics.participants.verdict import PEOPLE_COLUMNS
-from tactileq.analysis.statistics.verdicts import ClaimFound, overall_row
+from tactileq.analysis.statistics.verdicts import ClaimFound, overall_row, word_of
 from tactileq.modeling.files.columns import Column, names
 from tactileq.modeling.files.writing import file_stem
 
@@ -68,12 +68,11 @@ def priors_table(found: Sequence[ClaimFound]) -> pd.DataFrame:
     """Each claim with its priors, then with doubled ones: `PRIORS_COLUMNS`."""
     rows = []
     for one in found:
-        row, people, bounds = overall_row(one), one.people, one.claim.bounds
+        row, people = overall_row(one), one.people
         assert row is not None
         assert people is not None
-        assert bounds is not None
         for priors, summary in ((OWN, people.summary), (DOUBLED, people.doubled)):
-            word = one.caveats.allowed(summary.verdict(bounds), share_at_ends=row["share_at_ends"])
+            word = word_of(one, summary, row)
             names_of = {"claim": one.claim.name, "priors": priors, "verdict": word}
             rows.append({**vars(summary), **names_of})
     return pd.DataFrame(rows, columns=names(PRIORS_COLUMNS))

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import pandas as pd
 
@@ -14,11 +13,14 @@ from tactileq.analysis.chapters.claims.answer import answer, unfinished_tasks
 from tactileq.analysis.chapters.claims.forest import figure_forest
 from tactileq.analysis.chapters.claims.people import people_items
 from tactileq.analysis.chapters.claims.plan_sentences import deviations, methods_paragraph
-from tactileq.analysis.chapters.claims.sentences import by_verdict, claim_sentences
+from tactileq.analysis.chapters.claims.sentences import (
+    claim_sentences,
+    decided_interval,
+    differing,
+)
 from tactileq.analysis.labels import SCALES
 from tactileq.analysis.page.page import Fold, Picture, Table
 from tactileq.analysis.page.sections import Section
-from tactileq.analysis.statistics.caveats import DIFFERENCES
 from tactileq.analysis.statistics.claims import CLAIM_COLUMNS, NO_TEST, VERDICT_COLUMNS
 from tactileq.analysis.statistics.described_verdicts import (
     PLANTED_COLUMNS,
@@ -169,27 +171,22 @@ def _in_short(found: Sequence[ClaimFound], *, simulated: bool) -> Table:
         row = overall_row(one)
         if row is None:
             continue
-        decides = one.people if one.by_model else None
-        effect: dict[Hashable, Any] = {
-            name: row[name] for name in ("ci_low", "ci_high", "ci90_low", "ci90_high")
-        }
-        effect |= {"difference": row["mean_difference"], "n": row["n"]}
-        if decides is not None:
-            own = decides.summary
-            effect |= {"difference": own.mean, "n": len(decides.people)}
-            effect |= {"ci_low": own.mean_low, "ci_high": own.mean_high}
-            effect |= {"ci90_low": own.mean90_low, "ci90_high": own.mean90_high}
-        groups = by_verdict(one)
-        differ = [str(each["texture"]) for word in DIFFERENCES for each in groups.get(word, [])]
-        beside = row["tests_verdict"] if decides is not None else row["model_verdict"]
+        mean, low, high = decided_interval(one, row, level="95%")
+        _, low90, high90 = decided_interval(one, row, level="90%")
+        by_model = one.people if one.by_model else None
         rows.append(
             {
                 **row,
-                **effect,
+                "n": row["n"] if by_model is None else len(by_model.people),
+                "difference": mean,
+                "ci_low": low,
+                "ci_high": high,
+                "ci90_low": low90,
+                "ci90_high": high90,
                 "verdict": row["verdict"] or NO_TEST,
                 "people_p": row["people_p"] if one.claim.measure in SCALES else float("nan"),
-                "textures": ", ".join(differ),
-                "beside": beside,
+                "textures": ", ".join(str(each["texture"]) for each in differing(one)),
+                "beside": row["model_verdict" if by_model is None else "tests_verdict"],
             }
         )
     return Table(

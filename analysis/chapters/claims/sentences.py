@@ -31,7 +31,7 @@ from tactileq.analysis.statistics.equivalence import (
     INCONCLUSIVE,
     WITHIN_BOUNDS,
 )
-from tactileq.analysis.statistics.verdicts import ClaimFound, Row, overall_row
+from tactileq.analysis.statistics.verdicts import ClaimFound, Row, overall_row, word_of
 from tactileq.modeling.files.answer_tables import ANSWER_TABLES
 from tactileq.modeling.files.columns import p_value
 
@@ -87,13 +87,13 @@ def _beyond(found: ClaimFound, row: Row) -> bool:
     """Whether the whole 95 % interval lies beyond a bound; the mean where nobody varies."""
     if found.claim.bounds is None:
         return False
-    mean, *limits = _interval(found, row, level="95%")
+    mean, *limits = decided_interval(found, row, level="95%")
     low, high = (mean if np.isnan(limit) else limit for limit in limits)
     return bool(low > found.claim.bounds[1] or high < found.claim.bounds[0])
 
 
-def _interval(found: ClaimFound, row: Row, *, level: str) -> tuple[float, float, float]:
-    """The mean difference and the interval of what decides."""
+def decided_interval(found: ClaimFound, row: Row, *, level: str) -> tuple[float, float, float]:
+    """The mean difference and its interval, `95%` or `90%`, by what decides."""
     if found.by_model and found.people is not None:
         own = found.people.summary
         if level == "90%":
@@ -110,11 +110,11 @@ def _difference(found: ClaimFound, row: Row) -> str:
     both of a difference within the bounds.
     """
     unit, factor = unit_of(found.claim.measure)
-    verdict, intervals, mean = row["verdict"], [], float("nan")
-    for level in ("95%", "90%"):
-        mean, low, high = (factor * value for value in _interval(found, row, level=level))
-        wanted = verdict in (EQUIVALENT, WITHHELD) if level == "95%" else verdict not in _BY_90
-        if not wanted and np.isfinite(low):
+    intervals, mean = [], float("nan")
+    levels = ["95%"] * (row["verdict"] not in (EQUIVALENT, WITHHELD))
+    for level in levels + ["90%"] * (row["verdict"] in _BY_90):
+        mean, low, high = (factor * value for value in decided_interval(found, row, level=level))
+        if np.isfinite(low):
             intervals.append(f"{level} CI {signed(low, 1)} to {signed(high, 1)}")
     inside = ", ".join(intervals) or f"no interval, {row['note'] or 'since people do not vary'}"
     if found.claim.bounds is not None:
@@ -138,15 +138,17 @@ def _allowed(bounds: tuple[float, float], factor: float) -> str:
 def _which_textures(found: ClaimFound, row: Row) -> str:
     """Which single textures a difference comes from, and what the others show."""
     groups = {name: rows for name, rows in by_verdict(found).items() if name != NO_TEST}
-    differ = [one for verdict in DIFFERENCES for one in groups.get(verdict, [])]
-    count = sum(map(len, groups.values()))
-    if count < 2:
+    differ = differing(found)
+    if sum(map(len, groups.values())) < 2:
         return ""
     if not differ:
         return "No single texture shows it (Holm)." * (row["verdict"] in DIFFERENCES)
-    others = [str(one["texture"]) for name, rows in groups.items() for one in rows]
-    names = [str(one["texture"]) for one in differ]
-    others = [name for name in others if name not in names]
+    others = [
+        str(one["texture"])
+        for verdict, rows in groups.items()
+        for one in rows
+        if verdict not in DIFFERENCES
+    ]
     _, factor = unit_of(found.claim.measure)
     shown = ", ".join(
         f"{one['texture']} ({signed(factor * _mean_of(found, one), 1)})" for one in differ
@@ -164,10 +166,9 @@ def _mean_of(found: ClaimFound, row: Row) -> float:
 
 def _if_doubled(found: ClaimFound, row: Row) -> str:
     """That wider priors would turn the verdict; empty where they would not."""
-    if not found.by_model or found.people is None or found.claim.bounds is None:
+    if not found.by_model or found.people is None:
         return ""
-    word = found.people.doubled.verdict(found.claim.bounds)
-    word = found.caveats.allowed(word, share_at_ends=row["share_at_ends"])
+    word = word_of(found, found.people.doubled, row)
     if word in (row["verdict"], NOT_CONVERGED):
         return ""
     return f"With priors twice as wide the verdict would be “{word}”."
@@ -202,6 +203,12 @@ def by_verdict(found: ClaimFound) -> dict[str, list[Row]]:
         if row["texture"] != ALL_TEXTURES and row["verdict"] != CONTROL:
             groups.setdefault(row["verdict"] or NO_TEST, []).append(row)
     return groups
+
+
+def differing(found: ClaimFound) -> list[Row]:
+    """The rows of single textures that differ."""
+    groups = by_verdict(found)
+    return [row for verdict in DIFFERENCES for row in groups.get(verdict, [])]
 
 
 def difference(found: ClaimFound, row: Row, *, confidence: str = "95%") -> str:

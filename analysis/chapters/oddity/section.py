@@ -24,7 +24,7 @@ from tactileq.analysis.statistics.dprime import d_primes, oddity_d_prime
 from tactileq.analysis.statistics.verdicts import ClaimFound
 from tactileq.modeling.files.answer_tables import AnswerTable
 from tactileq.modeling.files.columns import Column, names
-from tactileq.modeling.participants.choices import ODDITY
+from tactileq.modeling.participants.choices import ODDITY_CHANCE
 
 ODDITY_COLUMNS = (
     Column("claim", is_name=True),
@@ -117,7 +117,7 @@ def oddity_sensitivity(found: ClaimFound) -> pd.DataFrame:
 
 
 def _sensitivity(row: Mapping[Hashable, Any]) -> dict[str, object]:
-    share, chance = float(row["mean_other"]), ODDITY.chance
+    share, chance = float(row["mean_other"]), ODDITY_CHANCE
     low, high, bound = (chance + row[name] for name in ("ci_low", "ci_high", "bound_high"))
     d_prime, d_low, d_high, as_d_prime = d_primes(share, low, high, bound, of=oddity_d_prime)
     return {

@@ -17,14 +17,12 @@ from tactileq.modeling.participants.ratings import RatingStudies
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PeopleData:
-    """The answers about one claim as the model of the participants takes them.
+    """The ratings about one claim as the model of the participants takes them.
 
     Parameters
     ----------
-    studies : RatingStudies or ChoiceStudies
+    studies : RatingStudies
         One study.
-    model : DecisionModel, optional
-        Of choices.
     people, textures : sequence of str
         In the order of the arrays.
     decides : bool
