@@ -14,11 +14,11 @@ from tactileq.experiments.sessions.store.withdrawing import drop_out, withdraw
 from tactileq.modeling import InputError
 from tests.refusals import refused
 
-TODAY = datetime.now().astimezone().date()
 
-
-def due(root, *, subject=1, today=TODAY):
-    people = {person.subject: person for person in study_progress(root, today=today).people}
+def due(root, *, subject=1, days=0):
+    """What is due so many days after today, whenever the tests began."""
+    day = datetime.now().astimezone().date() + timedelta(days=days)
+    people = {person.subject: person for person in study_progress(root, today=day).people}
     return people[subject].due
 
 
@@ -49,7 +49,7 @@ def test_the_next_session_follows_the_order_of_the_study(write_session):
     assert due(root) == "relative 1"
     write_session("relative")
     assert due(root) == "relative 2, not before tomorrow"
-    assert due(root, today=TODAY + timedelta(days=1)) == "relative 2"
+    assert due(root, days=1) == "relative 2"
     write_session("relative", session=2)
     assert due(root) == "oddity"
     for task in ("oddity", "threshold"):
