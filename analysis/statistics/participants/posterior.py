@@ -40,6 +40,7 @@ class Effort:
 
 
 LONGER = Effort(warm_up=800, steps=2400, every=6)  # where `Effort()` does not suffice
+LONGEST = Effort(warm_up=2400, steps=9600, every=24)  # where no verdict could rest on that either
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -161,16 +162,18 @@ def rating_draws(
 def sufficient_draws(
     studies: RatingStudies, *, rng: np.random.Generator, priors: RatingPriors | None = None
 ) -> list[Draws]:
-    """As `rating_draws`, with `LONGER` effort of those studies that need it."""
+    """As `rating_draws`, with `LONGER` or `LONGEST` effort of those studies that need it."""
     found = rating_draws(studies, rng=rng, priors=priors)
-    short = [
-        place
-        for place, draws in enumerate(found)
-        if not (draws.converged and draws.suffices(*PRINTED))
-    ]
-    if short:
-        taken = changed(studies, lambda one, axis: np.take(one, short, axis=axis))
-        again = rating_draws(taken, rng=rng, priors=priors, effort=LONGER)
+    for effort, wanted in ((LONGER, PRINTED), (LONGEST, VERDICT)):
+        short = [
+            place
+            for place, draws in enumerate(found)
+            if not (draws.converged and draws.suffices(*wanted))
+        ]
+        if not short:
+            break
+        taken = changed(studies, lambda one, axis, of=short: np.take(one, of, axis=axis))
+        again = rating_draws(taken, rng=rng, priors=priors, effort=effort)
         for place, draws in zip(short, again, strict=True):
             found[place] = draws
     return found

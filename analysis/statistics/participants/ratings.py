@@ -226,8 +226,10 @@ class RatingSampler:
 
         Pseudo-priors of Carlin and Chib (1995): effects of people who do not attend are in no
         likelihood, and drawn from the prior they would hardly ever fit the answers, so that whoever
-        is careless in one step stayed so. They are drawn as if these people attended, and the
-        ratio of that density to the prior's is taken back where classes are drawn.
+        is careless in one step stayed so. They are drawn as if these people attended and no trial
+        lapsed, or as often from the prior: where many trials lapsed, answers mislead, and whoever
+        attended stayed so. The ratio of that density to the prior's is taken back where classes
+        are drawn.
         """
         precision = 0.25 * self._given_count / variances[..., None]
         left = self._main.answered * (self._main.given - own)
@@ -241,17 +243,20 @@ class RatingSampler:
         known = (precision / grown).sum(axis=2) + prior
         middle = ((total - precision * textures) / grown).sum(axis=2) + mean * prior
         middle /= known
-        self.effects = np.where(self.attends, self.effects, self._normal(middle, known))
+        unlike = self._rng.random(known.shape) < 0.5
+        drawn = self._normal(np.where(unlike, mean, middle), np.where(unlike, prior, known))
+        self.effects = np.where(self.attends, self.effects, drawn)
         rest = total - precision * (self.effects[..., None] + textures)
         middles = variance * rest / grown
-        drawn = self._normal(middles, grown / variance)
+        told = ~unlike[..., None]
+        drawn = self._normal(told * middles, np.where(told, grown, 1.0) / variance)
         own_deviations = self._deviations = np.where(
             self.attends[..., None], self._deviations, drawn
         )
         away = own_deviations**2 - grown * (own_deviations - middles) ** 2
         log = (away / variance + np.log(grown)).sum(axis=2) + np.log(known / prior)
         log += prior * (self.effects - mean) ** 2 - known * (self.effects - middle) ** 2
-        found: Floats = 0.5 * log
+        found: Floats = np.logaddexp(0.5 * log, 0.0) - np.log(2)
         return found
 
     def _draw_effects(self) -> None:

@@ -38,6 +38,7 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
     few = Effort(chains=2, warm_up=2, steps=8, every=1)
     monkeypatch.setattr(posterior, "Effort", lambda: few)
     monkeypatch.setattr(posterior, "LONGER", few)
+    monkeypatch.setattr(posterior, "LONGEST", few)
     monkeypatch.setattr(posterior, "HIGHEST_R_HAT", 10.0)
     monkeypatch.setattr(posterior, "FEWEST_EFFECTIVE", 1.0)
 

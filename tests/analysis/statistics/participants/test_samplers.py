@@ -27,8 +27,10 @@ from tactileq.analysis.statistics.participants.posterior import (
 )
 from tactileq.analysis.statistics.participants.ratings import RatingSampler
 from tactileq.analysis.statistics.participants.verdict import PeopleSummary, summary_of
+from tactileq.benches.validation.people.held_out import OTHER_WORLDS
 from tactileq.modeling.arrays import Floats
 from tactileq.modeling.participants.ratings import HIGHEST, LOWEST, RatingPriors, RatingStudies
+from tactileq.modeling.seeds import generator, number_of
 
 BOUNDS = (-7.5, 7.5)
 SHORT = Effort(chains=4, warm_up=150, steps=240, every=3)
@@ -413,11 +415,22 @@ def test_one_quantity_that_is_not_sampled_well_spoils_those_it_belongs_to():
 def test_longer_is_sampled_only_what_did_not_suffice(monkeypatch: pytest.MonkeyPatch):
     rng = np.random.default_rng(17)
     studies = side_by_side([ratings(rng, np.full(8, one)) for one in (0.0, 25.0, 2.0)])
-    small, longer = Effort(chains=2, warm_up=30, steps=8), Effort(chains=2, warm_up=30, steps=12)
+    small, longer, longest = (Effort(chains=2, warm_up=30, steps=steps) for steps in (8, 12, 16))
     monkeypatch.setattr(posterior_module, "Effort", lambda: small)
     monkeypatch.setattr(posterior_module, "LONGER", longer)
-    for limit, kept in ((10.0, [4, 6, 4]), (1e9, [4, 4, 4]), (-1e9, [6, 6, 6])):
-        monkeypatch.setattr(Draws, "suffices", lambda self, *_, at=limit: self.mean.mean() < at)
+    monkeypatch.setattr(posterior_module, "LONGEST", longest)
+    printed_at = posterior_module.PRINTED
+    for limits, kept in (
+        ((10.0, 1e9), [4, 6, 4]),  # all that is printed, and what verdicts rest on, below a mean
+        ((10.0, 10.0), [4, 8, 4]),
+        ((1e9, 1e9), [4, 4, 4]),
+        ((-1e9, -1e9), [8, 8, 8]),
+    ):
+        monkeypatch.setattr(
+            Draws,
+            "suffices",
+            lambda self, *names, at=limits: self.mean.mean() < at[names != printed_at],
+        )
         found = sufficient_draws(studies, rng=rng)
         assert [draws.mean.shape for draws in found] == [(2, count) for count in kept]
         assert [draws.mean.mean() > 10 for draws in found] == [False, True, False]
@@ -434,6 +447,22 @@ def test_no_chain_begins_where_nobody_seems_to_attend() -> None:
     wide = RatingPriors().doubled()
     (draws,) = rating_draws(many, rng=np.random.default_rng(3), priors=wide, effort=SHORT)
     assert (draws.attends.mean(axis=(1, 2)) > 0.7).all()
+
+
+def test_whoever_seems_to_attend_can_be_found_careless() -> None:
+    """Somebody nudges the slider: half of the chains thought of lapses, and never changed."""
+    rng = generator(5, number_of("stopped short"), 20, 50)
+    drawn = OTHER_WORLDS["stopped short"](rng, (50, 20))
+    orders = drawn.orders[10:11] - 0.5
+    one = RatingStudies(
+        values=drawn.values[10:11],
+        anchors=drawn.anchors[10:11],
+        trends=np.stack([np.zeros_like(orders), orders]),
+    )
+    effort = Effort(chains=8, warm_up=100, steps=600)
+    (draws,) = rating_draws(one, rng=np.random.default_rng(1), effort=effort)
+    stayed = draws.attends[:, :, 7].mean(axis=1) > 0.95
+    assert stayed.sum() <= 1
 
 
 def test_chains_that_disagree_on_who_attends_did_not_converge() -> None:
