@@ -5,7 +5,7 @@ docs/method/participants.md#sampler
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -172,11 +172,14 @@ def sufficient_draws(
         ]
         if not short:
             break
-        taken = changed(studies, lambda one, axis, of=short: np.take(one, of, axis=axis))
-        again = rating_draws(taken, rng=rng, priors=priors, effort=effort)
+        again = rating_draws(_some(studies, short), rng=rng, priors=priors, effort=effort)
         for place, draws in zip(short, again, strict=True):
             found[place] = draws
     return found
+
+
+def _some(studies: RatingStudies, places: Sequence[int]) -> RatingStudies:
+    return changed(studies, lambda one, axis: np.take(one, places, axis=axis))
 
 
 def _observed(sampler: RatingSampler) -> Mapping[str, Any]:
