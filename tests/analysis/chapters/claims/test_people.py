@@ -313,7 +313,8 @@ def test_a_report_by_the_model_is_whole(tmp_path, responses, anchors, monkeypatc
     short = Effort(chains=2, warm_up=20, steps=40, every=4)
     where = "tactileq.analysis.statistics.participants.posterior"
     monkeypatch.setattr(f"{where}.Effort", lambda: short)
-    monkeypatch.setattr(f"{where}.LONGER", short)
+    for effort in ("LONGER", "LONGEST"):
+        monkeypatch.setattr(f"{where}.{effort}", short)
     few = rating_table(np.random.default_rng(3), people=8).assign(session=1)
     few["trial"] = few.groupby("participant_id").cumcount() + 1
     of_few = anchors["absolute"].assign(session=1, trial=99)
